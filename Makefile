@@ -1,0 +1,50 @@
+# bootprint: `make demo` and `make test` set up everything and do their job.
+#   make demo ARGS='--headless --duration 60'     make test ARGS='-k radio'
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+ROOMS := shared services/sensor-gateway services/pdr-engine services/fusion services/sa-hub proving-ground
+READY := $(VENV)/.ready
+
+.PHONY: help setup demo test check format golden figures compose-test constraints clean
+
+help: ## show what there is to make
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
+
+setup: $(READY) ## environment in .venv, every package pinned
+
+$(READY): constraints.txt pyproject.toml $(ROOMS:%=%/pyproject.toml)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "bootprint needs Python 3.11 or newer; try: make PYTHON=python3.11")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade --constraint constraints.txt pip hatchling editables
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-build-isolation --group dev $(ROOMS:%=--editable ./%)
+	@touch $@
+
+demo: $(READY) ## four soldiers, six computers, one picture; ARGS are passed on
+	$(BIN)/bootprint demo $(ARGS)
+
+test: $(READY) ## lint, types and all tests
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/pytest -n 2 --dist loadgroup $(ARGS)
+
+check: $(READY) ## lint and types only
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+format: $(READY) ## let ruff format and mend
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+constraints: ## write constraints.txt anew from a fresh environment (newest versions)
+	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new
+	$(VENV)-new/bin/python -m pip install --quiet --upgrade pip hatchling editables
+	$(VENV)-new/bin/python -m pip install --quiet --no-build-isolation --group dev $(ROOMS:%=--editable ./%)
+	(echo '# Every package of the house, pinned: the versions everything was tested with. Made by `make constraints`.'; \
+	 $(VENV)-new/bin/python -m pip list --format=freeze --exclude-editable --exclude setuptools | sort -f) > constraints.txt
+	rm -rf $(VENV)-new
+
+clean: ## remove the environment and all caches
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis

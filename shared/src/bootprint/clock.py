@@ -1,0 +1,85 @@
+"""Event time for shells: the only place where a host clock becomes the time that cores think in.
+
+At speed 1 event time is UTC. A replay at speed N runs event time N times as fast from a common origin, so that
+budgets, timers and ages hold in event time whatever the speed. A replay "as fast as possible" has no steady
+clock at all: event time is then the newest stamp seen.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+NS_PER_S = 1_000_000_000
+
+
+class EventClock(Protocol):
+    """Where a shell reads event time."""
+
+    def now_ns(self) -> int:
+        """Event time now, UTC ns."""
+
+    def observe(self, stamp_ns: int) -> None:
+        """A message with this stamp has arrived."""
+
+    def host_seconds_since(self, event_ns: int) -> float | None:
+        """How long ago, in host seconds, event time stood at ``event_ns``; None if that has no meaning."""
+
+    def host_seconds_until(self, event_ns: int) -> float:
+        """How long, in host seconds, until event time reaches ``event_ns``; never negative."""
+
+
+class ScaledClock:
+    """Event time that runs at ``speed`` from a common origin: ``origin + speed · (host − origin)``."""
+
+    def __init__(self, speed: float, origin_ns: int, host: Callable[[], int] = time.time_ns) -> None:
+        if not speed > 0:
+            raise ValueError(f"speed must be positive, got {speed}")
+        self._speed = speed
+        self._origin_ns = origin_ns
+        self._host = host
+
+    def now_ns(self) -> int:
+        """Event time now, UTC ns."""
+        return self._origin_ns + round(self._speed * (self._host() - self._origin_ns))
+
+    def observe(self, stamp_ns: int) -> None:
+        """Stamps do not move a steady clock."""
+
+    def host_seconds_since(self, event_ns: int) -> float | None:
+        """How long ago, in host seconds, event time stood at ``event_ns``."""
+        return (self.now_ns() - event_ns) / (self._speed * NS_PER_S)
+
+    def host_seconds_until(self, event_ns: int) -> float:
+        """How long, in host seconds, until event time reaches ``event_ns``."""
+        return max(0.0, (event_ns - self.now_ns()) / (self._speed * NS_PER_S))
+
+
+class DataClock:
+    """Event time that follows the newest stamp seen: for replay as fast as possible."""
+
+    def __init__(self) -> None:
+        self._newest_ns = 0
+
+    def now_ns(self) -> int:
+        """The newest stamp seen, 0 before the first."""
+        return self._newest_ns
+
+    def observe(self, stamp_ns: int) -> None:
+        """Move on to this stamp if it is newer."""
+        self._newest_ns = max(self._newest_ns, stamp_ns)
+
+    def host_seconds_since(self, event_ns: int) -> float | None:
+        """Has no meaning without a steady clock."""
+        return None
+
+    def host_seconds_until(self, event_ns: int) -> float:
+        """Nothing is waited for."""
+        return 0.0
+
+
+def make_clock(speed: str, origin_s: float | None) -> EventClock:
+    """A clock from the command line's ``--speed`` (a number, or ``max``) and ``--clock-origin`` (UTC seconds)."""
+    if speed == "max":
+        return DataClock()
+    origin_ns = time.time_ns() if origin_s is None else round(origin_s * NS_PER_S)
+    return ScaledClock(float(speed), origin_ns)

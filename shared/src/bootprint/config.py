@@ -1,0 +1,203 @@
+"""Configuration in TOML, checked strictly: an unknown key is an error that names it and what was meant.
+
+Two files describe a computer. ``realm.toml`` is the same on every computer: the realm's id, its origin, the
+roster and the names of the keys. ``computer.toml`` is this computer's own: who it belongs to, where its router
+is, and one section for each service, which that service alone understands (`section`).
+"""
+
+import difflib
+import re
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import msgspec
+
+from bootprint.errors import ConfigError
+from bootprint.messages import Latitude, Longitude
+from bootprint.topics import Identity, check_part
+
+T = TypeVar("T")
+_UNKNOWN = re.compile(r"Object contains unknown field `(?P<key>[^`]*)`(?: - at `(?P<at>[^`]*)`)?")
+
+
+class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """Base of every configuration table: unknown keys are refused."""
+
+
+class Origin(Config, frozen=True):
+    """Where local east, north, up are zero (WGS84, ellipsoidal height)."""
+
+    latitude_deg: Latitude
+    longitude_deg: Longitude
+    height_m: float = 0.0
+
+
+class Member(Config, frozen=True):
+    """One line of the roster."""
+
+    id: str
+    number: Annotated[int, msgspec.Meta(ge=0, le=1023)]
+    unit: str
+    callsign: str = ""
+    role: str = "rifleman"
+
+
+class Realm(Config, frozen=True):
+    """``realm.toml``: what all computers of an operation agree on."""
+
+    id: str
+    origin: Origin
+    roster: tuple[Member, ...]
+    group_key: str = "group"
+
+    def member(self, soldier: str) -> Member:
+        """The roster's line of a soldier id; ConfigError if there is none."""
+        for member in self.roster:
+            if member.id == soldier:
+                return member
+        known = ", ".join(member.id for member in self.roster)
+        raise ConfigError(f"soldier {soldier!r} is not in the roster of realm {self.id!r} (known: {known})")
+
+    def by_number(self) -> dict[int, Member]:
+        """The roster by radio number."""
+        return {member.number: member for member in self.roster}
+
+
+class ComputerFile(Config, frozen=True):
+    """``computer.toml`` as it stands in the file; sections are converted by the services they belong to."""
+
+    realm: str
+    soldier: str
+    router: str = "tcp/127.0.0.1:7447"
+    state_dir: str = "state"
+    keys_dir: str = "keys"
+    gateway: dict[str, Any] = {}
+    pdr: dict[str, Any] = {}
+    fusion: dict[str, Any] = {}
+    hub: dict[str, Any] = {}
+
+
+@dataclass(frozen=True)
+class Computer:
+    """A computer's configuration with its realm loaded and its paths resolved against the file's folder."""
+
+    path: Path
+    realm: Realm
+    member: Member
+    router: str
+    state_dir: Path
+    keys_dir: Path
+    sections: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @property
+    def identity(self) -> Identity:
+        """The part of the key that all of this computer's topics share."""
+        return Identity(self.realm.id, self.member.unit, self.member.id)
+
+    def section(self, name: str, type_: type[T]) -> T:
+        """One service's section, strictly converted; ConfigError says what is wrong and where."""
+        return convert(self.sections[name], type_, where=f"{self.path}: [{name}]")
+
+    def relative(self, path: str) -> Path:
+        """A path from the file, resolved against the file's own folder."""
+        return self.path.parent / path
+
+
+def load_computer(path: Path) -> Computer:
+    """Read ``computer.toml`` and the realm it names; ConfigError on anything wrong in either."""
+    file = load_toml(path, ComputerFile)
+    realm = load_realm(path.parent / file.realm)
+    return Computer(
+        path=path,
+        realm=realm,
+        member=realm.member(file.soldier),
+        router=file.router,
+        state_dir=path.parent / file.state_dir,
+        keys_dir=path.parent / file.keys_dir,
+        sections={name: getattr(file, name) for name in ("gateway", "pdr", "fusion", "hub")},
+    )
+
+
+def load_realm(path: Path) -> Realm:
+    """Read ``realm.toml``; ConfigError if ids repeat or cannot stand in a key."""
+    realm = load_toml(path, Realm)
+    for name, values in (
+        ("id", [member.id for member in realm.roster]),
+        ("number", [str(member.number) for member in realm.roster]),
+    ):
+        twice = sorted({value for value in values if values.count(value) > 1})
+        if twice:
+            raise ConfigError(f"{path}: roster has {name} {', '.join(twice)} more than once; make each unique")
+    try:
+        check_part("id", realm.id)
+        for member in realm.roster:
+            check_part("roster id", member.id)
+            check_part("roster unit", member.unit)
+    except ValueError as error:
+        raise ConfigError(f"{path}: {error}") from error
+    return realm
+
+
+def load_toml(path: Path, type_: type[T]) -> T:
+    """Read a TOML file strictly into ``type_``; ConfigError names the file, the place and the mend."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+    return convert(values, type_, where=str(path))
+
+
+def convert(values: object, type_: type[T], where: str) -> T:
+    """Convert plain values strictly; ConfigError tells ``where`` and what is known there."""
+    try:
+        return msgspec.convert(values, type_)
+    except msgspec.ValidationError as error:
+        raise ConfigError(f"{where}: {_explain(str(error), values, type_)}") from error
+
+
+def _explain(message: str, values: object, type_: type) -> str:
+    """Turn msgspec's message into a sentence with the place and, for an unknown key, the nearest known one."""
+    unknown = _UNKNOWN.match(message)
+    if not unknown:
+        return message.replace(" - at `$.", " (at ").replace(" - at `$", " (at ").replace("`", "") + (
+            ")" if " - at " in message else ""
+        )
+    key, at = unknown["key"], unknown["at"] or "$"
+    known = _keys_at(type_, at)
+    nearest = difflib.get_close_matches(key, known, n=1)
+    hint = f"; did you mean {nearest[0]!r}?" if nearest else f"; known keys: {', '.join(known)}" if known else ""
+    place = at.removeprefix("$").removeprefix(".")
+    return f"unknown key {key!r}{f' in {place}' if place else ''}{hint}"
+
+
+def _keys_at(type_: object, at: str) -> list[str]:
+    """The known keys of the table at a msgspec path such as ``$.sources[...].port``."""
+    for part in re.findall(r"\.([A-Za-z0-9_]+)|\[(?:\.\.\.|\d+)\]", at):
+        if part:
+            info = msgspec.inspect.type_info(type_)
+            fields = {f.encode_name: f for f in getattr(info, "fields", ())}
+            if part not in fields:
+                return []
+            type_ = _element(fields[part].type)
+        else:
+            continue
+    info = msgspec.inspect.type_info(type_) if not isinstance(type_, msgspec.inspect.Type) else type_
+    return [f.encode_name for f in getattr(info, "fields", ())]
+
+
+def _element(info: msgspec.inspect.Type) -> object:
+    """The struct type inside a field's type: through arrays, optionals and unions."""
+    inner = getattr(info, "item_type", None) or next(
+        (t for t in getattr(info, "types", ()) if isinstance(t, msgspec.inspect.StructType)), None
+    )
+    if inner is not None:
+        return _element(inner)
+    return getattr(info, "cls", object)

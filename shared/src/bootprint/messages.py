@@ -1,0 +1,342 @@
+"""Every message on the bus: msgspec structs, MessagePack maps on the wire, SI units in the field names.
+
+Unknown is None, never a magic number. Arrays travel as little-endian bytes whose dtype and shape are fixed by
+the field: ``*_time_ns`` is ``<i8 (n,)``, vectors are ``<f8 (n, 3)``. A new field is always optional; a breaking
+change is a new version of the key space. Each struct checks itself when it is built *and* when it is decoded,
+so what passes here is finite and of the right shape.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+Float64Array = npt.NDArray[np.float64]
+Int64Array = npt.NDArray[np.int64]
+
+Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
+Longitude = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
+NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
+Percent = Annotated[float, msgspec.Meta(ge=0.0, le=100.0)]
+Count = Annotated[int, msgspec.Meta(ge=0)]
+Vector3 = tuple[float, float, float]
+Name = Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
+
+FixKind = Literal["none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "dead_reckoning"]
+MotionClass = Literal["standing", "walking", "running", "stairs", "crawling", "unknown"]
+Mode = Literal["unplaced", "gnss", "boots", "body", "camera", "coasting", "lost"]
+TrackState = Literal["fresh", "stale", "lost"]
+ServiceState = Literal["starting", "ok", "degraded", "failed", "stopped"]
+
+
+def _all_finite(value: object) -> bool:
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, tuple):
+        return all(_all_finite(item) for item in value)
+    return True
+
+
+class Message(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
+    """What all messages carry: the event's time (UTC ns, by the sensor's stamp) and a count per source."""
+
+    time_ns: int
+    sequence: Count = 0
+
+    def __post_init__(self) -> None:
+        for field in self.__struct_fields__:
+            if not _all_finite(getattr(self, field)):
+                raise ValueError(f"{field} is not finite")
+
+
+def _packed(values: npt.ArrayLike, dtype: str, columns: int | None) -> bytes:
+    array = np.ascontiguousarray(values, dtype=dtype)
+    if columns is not None and (array.ndim != 2 or array.shape[1] != columns):
+        raise ValueError(f"expected shape (n, {columns}), got {array.shape}")
+    return array.tobytes()
+
+
+class ImuBatch(Message, frozen=True):
+    """About ten consecutive samples of one inertial unit, in its own axes as mounted.
+
+    ``time_ns`` is the first sample's time. Specific force in m/s², angular rate in rad/s, field in µT.
+    """
+
+    sample_time_ns: bytes
+    accel_m_s2: bytes
+    gyro_rad_s: bytes
+    mag_ut: bytes | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        count, rest = divmod(len(self.sample_time_ns), 8)
+        if rest or count == 0:
+            raise ValueError(f"sample_time_ns has {len(self.sample_time_ns)} bytes, want a multiple of 8")
+        for name in ("accel_m_s2", "gyro_rad_s", "mag_ut"):
+            data: bytes | None = getattr(self, name)
+            if data is None:
+                continue
+            if len(data) != count * 24:
+                raise ValueError(f"{name} has {len(data)} bytes, want {count * 24} for {count} samples")
+            if not np.isfinite(np.frombuffer(data, "<f8")).all():
+                raise ValueError(f"{name} has values that are not finite")
+
+    @classmethod
+    def from_arrays(
+        cls,
+        sequence: int,
+        sample_time_ns: npt.ArrayLike,
+        accel_m_s2: npt.ArrayLike,
+        gyro_rad_s: npt.ArrayLike,
+        mag_ut: npt.ArrayLike | None = None,
+    ) -> "ImuBatch":
+        """Build from arrays (n,), (n, 3), (n, 3) and optionally (n, 3)."""
+        times = np.ascontiguousarray(sample_time_ns, dtype="<i8")
+        return cls(
+            time_ns=int(times[0]),
+            sequence=sequence,
+            sample_time_ns=times.tobytes(),
+            accel_m_s2=_packed(accel_m_s2, "<f8", 3),
+            gyro_rad_s=_packed(gyro_rad_s, "<f8", 3),
+            mag_ut=None if mag_ut is None else _packed(mag_ut, "<f8", 3),
+        )
+
+    @property
+    def times(self) -> Int64Array:
+        """Sample times, UTC ns, shape (n,), read-only."""
+        return np.frombuffer(self.sample_time_ns, "<i8")
+
+    @property
+    def accel(self) -> Float64Array:
+        """Specific force, m/s², shape (n, 3), read-only."""
+        return np.frombuffer(self.accel_m_s2, "<f8").reshape(-1, 3)
+
+    @property
+    def gyro(self) -> Float64Array:
+        """Angular rate, rad/s, shape (n, 3), read-only."""
+        return np.frombuffer(self.gyro_rad_s, "<f8").reshape(-1, 3)
+
+    @property
+    def mag(self) -> Float64Array | None:
+        """Magnetic field, µT, shape (n, 3), read-only, or None."""
+        return None if self.mag_ut is None else np.frombuffer(self.mag_ut, "<f8").reshape(-1, 3)
+
+
+class Pressure(Message, frozen=True):
+    """Absolute air pressure."""
+
+    pressure_pa: Annotated[float, msgspec.Meta(gt=0.0)]
+    temperature_c: float | None = None
+
+
+class GnssFix(Message, frozen=True):
+    """One solution of a satellite receiver, accuracies in metres (one sigma), height above the ellipsoid."""
+
+    fix_kind: FixKind
+    latitude_deg: Latitude | None = None
+    longitude_deg: Longitude | None = None
+    height_m: float | None = None
+    horizontal_accuracy_m: NonNegative | None = None
+    vertical_accuracy_m: NonNegative | None = None
+    satellites: Count | None = None
+    hdop: NonNegative | None = None
+    speed_m_s: NonNegative | None = None
+    speed_accuracy_m_s: NonNegative | None = None
+    course_rad: float | None = None
+
+
+class CameraMotion(Message, frozen=True):
+    """Motion of a camera between ``start_time_ns`` and ``time_ns``, in the camera body's axes at the start.
+
+    Axes forward, left, up. ``covariance`` is the upper triangle (21 numbers, row by row) of the 6x6 matrix of
+    (translation m, rotation vector rad), None if unknown.
+    """
+
+    start_time_ns: int
+    translation_m: Vector3
+    rotation_rad: Vector3
+    covariance: Annotated[tuple[float, ...], msgspec.Meta(min_length=21, max_length=21)] | None = None
+    confidence_pct: Percent | None = None
+
+
+class Range(Message, frozen=True):
+    """Measured distance to another unit (soldier id, ``soldier/left_foot``, beacon)."""
+
+    peer: Name
+    distance_m: NonNegative
+    sigma_m: NonNegative | None = None
+
+
+class FootStep(Message, frozen=True):
+    """One stance of one foot: what happened since the stance before (``start_time_ns``).
+
+    ``displacement_m`` is forward, left, up in the foot's heading at the *start* of the step, and
+    ``heading_change_rad`` is counter-clockwise positive (a yaw). ``covariance`` is the upper triangle (10 numbers,
+    row by row) of the 4x4 matrix of (forward m, left m, up m, heading rad). A stance that goes on is reported
+    every half second as a step of (nearly) zero displacement with motion class "standing".
+    """
+
+    start_time_ns: int
+    displacement_m: Vector3
+    heading_change_rad: float
+    covariance: Annotated[tuple[float, ...], msgspec.Meta(min_length=10, max_length=10)]
+    motion: MotionClass = "unknown"
+    stance_quality: Percent | None = None
+    realigned: bool = False
+
+
+class FootPose(Message, frozen=True):
+    """Where a foot is now, relative to its last FootStep (``step_sequence``), in that step's end heading."""
+
+    step_sequence: Count
+    displacement_m: Vector3
+    heading_change_rad: float
+    speed_m_s: NonNegative
+    in_stance: bool
+
+
+class BodyStep(Message, frozen=True):
+    """One step seen by a body-worn unit (compass, gyro, barometer)."""
+
+    start_time_ns: int
+    length_m: NonNegative
+    length_sigma_m: NonNegative
+    azimuth_rad: float
+    azimuth_sigma_rad: NonNegative
+    motion: MotionClass = "unknown"
+    height_m: float | None = None
+    compass_azimuth_rad: float | None = None
+    gyro_azimuth_rad: float | None = None
+    gnss_azimuth_rad: float | None = None
+    azimuth_redundancy_pct: Percent | None = None
+
+
+class Fix(Message, frozen=True):
+    """A person says where a soldier is (known point, doorway), and perhaps which way they face."""
+
+    latitude_deg: Latitude
+    longitude_deg: Longitude
+    height_m: float | None = None
+    accuracy_m: NonNegative = 1.0
+    azimuth_rad: float | None = None
+    azimuth_sigma_rad: NonNegative | None = None
+
+
+class Position(Message, frozen=True):
+    """A soldier's position: WGS84 with ellipsoidal height, and local ENU around the realm's origin.
+
+    ``covariance_m2`` is (ee, en, eu, nn, nu, uu). ``course_rad`` is the direction of motion, ``facing_rad`` the
+    direction of the body; azimuths clockwise from true north.
+    """
+
+    mode: Mode
+    latitude_deg: Latitude
+    longitude_deg: Longitude
+    height_m: float
+    east_m: float
+    north_m: float
+    up_m: float
+    covariance_m2: tuple[float, float, float, float, float, float]
+    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+    speed_m_s: NonNegative = 0.0
+    course_rad: float | None = None
+    course_sigma_rad: NonNegative | None = None
+    facing_rad: float | None = None
+    facing_sigma_rad: NonNegative | None = None
+    floor: int | None = None
+    motion: MotionClass = "unknown"
+    sources: tuple[str, ...] = ()
+    rejected: tuple[str, ...] = ()
+    reliability_pct: Percent | None = None
+
+
+class Track(Message, frozen=True):
+    """A hub's knowledge of one soldier; ``time_ns`` is the time of the position, not of its arrival."""
+
+    soldier: Name
+    number: Annotated[int, msgspec.Meta(ge=0, le=1023)]
+    state: TrackState
+    latitude_deg: Latitude
+    longitude_deg: Longitude
+    height_m: float | None
+    accuracy_m: NonNegative
+    east_velocity_m_s: float = 0.0
+    north_velocity_m_s: float = 0.0
+    mode: Mode = "boots"
+    floor: int | None = None
+    callsign: str | None = None
+    received_ns: int | None = None
+    via: Name = "own"
+    hops: Count = 0
+
+
+class LinkReport(Message, frozen=True):
+    """What one radio link carried; bits of the air, the link's header bytes included, in event time."""
+
+    link: Name
+    budget_bits_per_s: NonNegative
+    bits_per_s: NonNegative
+    frames_sent: Count
+    frames_received: Count
+    frames_rejected: Count
+    frames_lost: Count
+    bytes_sent: Count
+    bytes_received: Count
+
+
+class Alert(Message, frozen=True):
+    """Something the squad must see now."""
+
+    soldier: Name
+    kind: Literal["contact", "casualty", "help", "fire", "withdraw", "other"]
+    text: Annotated[str, msgspec.Meta(max_length=200)] = ""
+
+
+class Observation(Message, frozen=True):
+    """A thing seen, with its place."""
+
+    soldier: Name
+    latitude_deg: Latitude
+    longitude_deg: Longitude
+    accuracy_m: NonNegative
+    text: Annotated[str, msgspec.Meta(max_length=200)] = ""
+
+
+class Status(Message, frozen=True):
+    """How a soldier is."""
+
+    soldier: Name
+    condition: Literal["ok", "busy", "wounded", "out"] = "ok"
+    battery_pct: Percent | None = None
+
+
+class Health(Message, frozen=True):
+    """How a process is: its state, counts since start (faults included) and gauges."""
+
+    service: Name
+    state: ServiceState
+    counters: dict[str, int] = {}
+    gauges: dict[str, float] = {}
+    note: str = ""
+
+
+def upper_triangle(matrix: npt.ArrayLike) -> tuple[float, ...]:
+    """The upper triangle of a symmetric matrix (n, n), row by row, as a tuple of n(n+1)/2 floats."""
+    square = np.asarray(matrix, dtype=np.float64)
+    rows, columns = np.triu_indices(square.shape[0])
+    return tuple(float(value) for value in square[rows, columns])
+
+
+def symmetric(triangle: Sequence[float]) -> Float64Array:
+    """The symmetric matrix (n, n) whose upper triangle, row by row, is given (inverse of `upper_triangle`)."""
+    size = int((math.isqrt(8 * len(triangle) + 1) - 1) // 2)
+    if size * (size + 1) // 2 != len(triangle):
+        raise ValueError(f"{len(triangle)} numbers are no triangle of a square matrix")
+    matrix = np.zeros((size, size))
+    rows, columns = np.triu_indices(size)
+    matrix[rows, columns] = triangle
+    matrix[columns, rows] = triangle
+    return matrix

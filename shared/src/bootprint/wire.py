@@ -1,0 +1,32 @@
+"""Messages to bytes and back: MessagePack maps, typed and checked by the topic they travel under."""
+
+from functools import cache
+
+import msgspec
+
+from bootprint.errors import WireError
+from bootprint.messages import Message
+from bootprint.topics import BY_SUBJECT
+
+MAX_MESSAGE_BYTES = 1 << 20
+_ENCODER = msgspec.msgpack.Encoder(order="deterministic")
+
+
+@cache
+def _decoder(subject: str) -> msgspec.msgpack.Decoder[Message]:
+    return msgspec.msgpack.Decoder(BY_SUBJECT[subject].message)
+
+
+def encode(message: Message) -> bytes:
+    """The message as a MessagePack map; the same message always gives the same bytes."""
+    return _ENCODER.encode(message)
+
+
+def decode(subject: str, payload: bytes) -> Message:
+    """The message of a subject; unknown fields are ignored, anything wrong raises WireError."""
+    if len(payload) > MAX_MESSAGE_BYTES:
+        raise WireError(f"{subject}: {len(payload)} bytes, more than {MAX_MESSAGE_BYTES}")
+    try:
+        return _decoder(subject).decode(payload)
+    except (msgspec.DecodeError, msgspec.ValidationError, ValueError, RecursionError) as error:
+        raise WireError(f"{subject}: {error}") from error
