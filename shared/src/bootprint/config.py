@@ -129,7 +129,9 @@ def load_realm(path: Path) -> Realm:
     ):
         twice = sorted({value for value in values if values.count(value) > 1})
         if twice:
-            raise ConfigError(f"{path}: roster has {name} {', '.join(twice)} more than once; make each unique")
+            raise ConfigError(
+                f"{path}: roster has {name} {', '.join(twice)} more than once; make each unique"
+            )
     try:
         check_part("id", realm.id)
         for member in realm.roster:
@@ -173,7 +175,9 @@ def _explain(message: str, values: object, type_: type) -> str:
     key, at = unknown["key"], unknown["at"] or "$"
     known = _keys_at(type_, at)
     nearest = difflib.get_close_matches(key, known, n=1)
-    hint = f"; did you mean {nearest[0]!r}?" if nearest else f"; known keys: {', '.join(known)}" if known else ""
+    hint = (
+        f"; did you mean {nearest[0]!r}?" if nearest else f"; known keys: {', '.join(known)}" if known else ""
+    )
     place = at.removeprefix("$").removeprefix(".")
     return f"unknown key {key!r}{f' in {place}' if place else ''}{hint}"
 

@@ -14,7 +14,9 @@ class LocalFrame:
         self.origin = origin
         self._at = (origin.latitude_deg, origin.longitude_deg, origin.height_m)
 
-    def to_enu(self, latitude_deg: float, longitude_deg: float, height_m: float) -> tuple[float, float, float]:
+    def to_enu(
+        self, latitude_deg: float, longitude_deg: float, height_m: float
+    ) -> tuple[float, float, float]:
         """Geodetic to (east, north, up) in metres."""
         east, north, up = pymap3d.geodetic2enu(latitude_deg, longitude_deg, height_m, *self._at)
         return float(east), float(north), float(up)

@@ -1,0 +1,31 @@
+"""Logging of all processes: structlog to standard error, one line per event."""
+
+import logging
+import sys
+
+import structlog
+
+from bootprint.errors import ConfigError
+
+
+def configure(level: str = "info", *, json: bool = False) -> None:
+    """Set up logging for this process; ConfigError on an unknown level."""
+    number = logging.getLevelNamesMapping().get(level.upper())
+    if number is None:
+        raise ConfigError(f"--log-level {level!r} must be debug, info, warning or error")
+    renderer: structlog.typing.Processor = (
+        structlog.processors.JSONRenderer()
+        if json
+        else structlog.processors.LogfmtRenderer(key_order=["timestamp", "level", "event"])
+    )
+    structlog.configure(
+        processors=[
+            structlog.processors.add_log_level,
+            structlog.processors.TimeStamper(fmt="iso"),
+            structlog.processors.format_exc_info,
+            renderer,
+        ],
+        wrapper_class=structlog.make_filtering_bound_logger(number),
+        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+        cache_logger_on_first_use=True,
+    )

@@ -1,0 +1,368 @@
+"""The scaffold of every service: arguments, logging, signals, router, liveliness, health, and a clean end.
+
+A service is a `Part` (its core plus whatever it opens) in a loop of one thread: messages and posted jobs come
+through one inbox, `tick` comes with host time, outputs go to the bus. So a core is never called from two threads.
+"""
+
+import queue
+import resource
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Protocol
+
+import structlog
+import typer
+
+from bootprint import logs
+from bootprint.bus import Core, Envelope
+from bootprint.clock import EventClock, make_clock
+from bootprint.config import Computer, load_computer
+from bootprint.errors import BootprintError, ConfigError
+from bootprint.messages import Health, ServiceState
+from bootprint.topics import Identity
+from bootprint.zenoh_bus import ZenohBus, open_bus
+
+_INBOX_SIZE = 20_000
+_TICK_S = 0.05
+_HEALTH_S = 1.0
+EXIT_BAD_INPUT = 2
+
+Job = Callable[[], Iterable[Envelope]]
+
+
+@dataclass
+class Figures:
+    """What a service tells of itself once a second: faults and work as counters, rates and ages as gauges."""
+
+    state: ServiceState = "ok"
+    counters: dict[str, int] = field(default_factory=dict)
+    gauges: dict[str, float] = field(default_factory=dict)
+    note: str = ""
+
+
+class Part(Protocol):
+    """A service's inside, as the scaffold drives it; all but `start` run in the main thread."""
+
+    def start(self) -> None:
+        """The bus is open: open sources, start threads."""
+
+    def handle(self, envelope: Envelope) -> Iterable[Envelope]:
+        """Take one message in."""
+
+    def tick(self, now_ns: int) -> Iterable[Envelope]:
+        """Event time is ``now_ns``."""
+
+    def figures(self) -> Figures:
+        """State and counts for the health message."""
+
+    def close(self) -> Iterable[Envelope]:
+        """The end: free everything; the last outputs."""
+
+
+class CoreWithFigures(Core, Protocol):
+    """A pure core that also counts."""
+
+    def figures(self) -> Figures:
+        """State and counts for the health message."""
+
+
+class CorePart:
+    """A `Part` that is nothing but a pure core."""
+
+    def __init__(self, core: CoreWithFigures) -> None:
+        self._core = core
+
+    def start(self) -> None:
+        """Nothing to open."""
+
+    def handle(self, envelope: Envelope) -> Iterable[Envelope]:
+        """Pass the message to the core."""
+        return self._core.handle(envelope)
+
+    def tick(self, now_ns: int) -> Iterable[Envelope]:
+        """Pass event time to the core."""
+        return self._core.tick(now_ns)
+
+    def figures(self) -> Figures:
+        """The core's own figures."""
+        return self._core.figures()
+
+    def close(self) -> Iterable[Envelope]:
+        """A core that has last words says them through an optional ``close``."""
+        last_words: Job | None = getattr(self._core, "close", None)
+        return last_words() if last_words else ()
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command line said."""
+
+    config: Path
+    router: str | None = None
+    router_wait_s: float = 10.0
+    speed: str = "1"
+    clock_origin_s: float | None = None
+    wait_for: tuple[str, ...] = ()
+    stop_on_eof: bool = False
+    log_level: str = "info"
+    log_json: bool = False
+
+
+class Context:
+    """What a part may use of the world outside it."""
+
+    def __init__(self, service: str, computer: Computer, options: Options) -> None:
+        self.service = service
+        self.computer = computer
+        self.options = options
+        self.identity: Identity = computer.identity
+        self.clock: EventClock = make_clock(options.speed, options.clock_origin_s)
+        self.log: structlog.stdlib.BoundLogger = structlog.get_logger().bind(
+            service=service, soldier=self.identity.soldier
+        )
+        self.lossless = options.speed == "max"
+        self.inbox: queue.Queue[Envelope | Job | None] = queue.Queue(_INBOX_SIZE)
+        self.inbox_dropped = 0
+        self.stopping = threading.Event()
+        self.exit_code = 0
+        self._bus: ZenohBus | None = None
+
+    @property
+    def bus(self) -> ZenohBus:
+        """The open bus."""
+        if self._bus is None:
+            raise RuntimeError("the bus is not open yet")
+        return self._bus
+
+    def connect(self) -> ZenohBus:
+        """Open the bus; BusError if no router answers in time."""
+        self._bus = open_bus(
+            self.options.router or self.computer.router,
+            timeout_s=self.options.router_wait_s,
+            lossless=self.lossless,
+            should_stop=self.stopping.is_set,
+        )
+        return self._bus
+
+    def publish(self, envelope: Envelope) -> None:
+        """Send one message; from any thread."""
+        self.bus.publish(envelope)
+
+    def post(self, job: Job) -> None:
+        """Run ``job`` in the main loop and publish what it returns; from any thread."""
+        self._put(job)
+
+    def receive(self, envelope: Envelope) -> None:
+        """Hand a message from the bus to the main loop; from any thread."""
+        self._put(envelope)
+
+    def _put(self, item: Envelope | Job) -> None:
+        if self.lossless:
+            self.inbox.put(item)
+            return
+        try:
+            self.inbox.put_nowait(item)
+        except queue.Full:
+            self.inbox_dropped += 1
+
+    def wait_alive(self, services: Sequence[str], timeout_s: float = 30.0) -> bool:
+        """Wait until these services of this soldier hold their liveliness tokens; False if not in time."""
+        wanted = {self.identity.selector("health", service) for service in services}
+        deadline = time.monotonic() + timeout_s
+        while wanted - self.bus.alive(self.identity.selector("health")):
+            if time.monotonic() > deadline or self.wait_stop(0.1):
+                return False
+        return True
+
+    def wait_stop(self, timeout_s: float) -> bool:
+        """Sleep, interruptibly; True when the service is stopping."""
+        return self.stopping.wait(timeout_s)
+
+    def finish(self, exit_code: int = 0) -> None:
+        """Ask the main loop to end."""
+        self.exit_code = exit_code
+        self.stopping.set()
+
+
+@dataclass(frozen=True)
+class Service:
+    """A service: its name (also its command and its liveliness token), its inputs and how its part is built."""
+
+    name: str
+    summary: str
+    subjects: tuple[str, ...]
+    build: Callable[[Context], Part]
+
+    def main(self) -> None:
+        """The console script: parse arguments, run, exit (2 with one line on bad input)."""
+        app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+        app.command(help=self.summary)(self._command)
+        app()
+
+    def _command(
+        self,
+        config: Annotated[Path, typer.Option(help="This computer's configuration.")] = Path("computer.toml"),
+        router: Annotated[str | None, typer.Option(help="Router to use, e.g. tcp/127.0.0.1:7447.")] = None,
+        router_wait: Annotated[float, typer.Option(help="Seconds to wait for the router.")] = 10.0,
+        speed: Annotated[str, typer.Option(help="Event time runs this many times as fast, or 'max'.")] = "1",
+        clock_origin: Annotated[
+            float | None,
+            typer.Option(help="UTC seconds at which event time equals host time (with --speed)."),
+        ] = None,
+        wait_for: Annotated[str, typer.Option(help="Services to wait for before replaying: a,b,c.")] = "",
+        stop_on_eof: Annotated[bool, typer.Option(help="Stop when standard input closes.")] = False,
+        log_level: Annotated[str, typer.Option(help="debug, info, warning or error.")] = "info",
+        log_json: Annotated[bool, typer.Option(help="Log one JSON object a line.")] = False,
+    ) -> None:
+        options = Options(
+            config=config,
+            router=router,
+            router_wait_s=router_wait,
+            speed=speed,
+            clock_origin_s=clock_origin,
+            wait_for=tuple(name for name in wait_for.split(",") if name),
+            stop_on_eof=stop_on_eof,
+            log_level=log_level,
+            log_json=log_json,
+        )
+        try:
+            _check_speed(speed)
+            logs.configure(log_level, json=log_json)
+            code = run(self, Context(self.name, load_computer(config), options))
+        except BootprintError as error:
+            sys.stderr.write(f"{self.name}: {error}\n")
+            code = EXIT_BAD_INPUT
+        raise typer.Exit(code)
+
+
+def _check_speed(speed: str) -> None:
+    if speed == "max":
+        return
+    try:
+        good = 0 < float(speed) < 1e6
+    except ValueError:
+        good = False
+    if not good:
+        raise ConfigError(f"--speed {speed!r} must be a positive number or 'max'")
+
+
+def run(service: Service, context: Context) -> int:
+    """Run a service until a signal, end of input or its own wish; returns the exit code."""
+    _stop_on_signals(context)
+    part = service.build(context)
+    bus = context.connect()
+    try:
+        for subject in service.subjects:
+            bus.subscribe(context.identity.selector(subject), context.receive)
+        part.start()
+        bus.declare_alive(context.identity, service.name)
+        context.log.info("running", router=context.options.router or context.computer.router)
+        if context.options.stop_on_eof:
+            threading.Thread(target=_stop_on_eof, args=(context,), daemon=True).start()
+        _Loop(service, part, context).run()
+        context.log.info("stopped", exit_code=context.exit_code)
+    finally:
+        context.stopping.set()
+        bus.close()
+    return context.exit_code
+
+
+def _stop_on_signals(context: Context) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: context.stopping.set())
+
+
+def _stop_on_eof(context: Context) -> None:
+    """A parent that dies, however it dies, closes our standard input."""
+    while sys.stdin.buffer.read(1024):
+        pass
+    context.stopping.set()
+
+
+class _Loop:
+    """The main loop: inbox, tick, health."""
+
+    def __init__(self, service: Service, part: Part, context: Context) -> None:
+        self._service = service
+        self._part = part
+        self._context = context
+        self._errors = 0
+        self._health_sequence = 0
+
+    def run(self) -> None:
+        context, part = self._context, self._part
+        next_tick = next_health = time.monotonic()
+        while not context.stopping.is_set():
+            self._drain(max(0.0, next_tick - time.monotonic()))
+            now = time.monotonic()
+            if now >= next_tick:
+                next_tick = now + _TICK_S
+                self._guarded(lambda: part.tick(context.clock.now_ns()))
+            if now >= next_health:
+                next_health = now + _HEALTH_S
+                self._guarded(self._health)
+        self._drain(0.0, to_the_end=True)
+        self._guarded(part.close)
+        self._guarded(lambda: self._health(stopped=True))
+
+    def _drain(self, timeout_s: float, *, to_the_end: bool = False) -> None:
+        """Take what is waiting, at least until ``timeout_s`` has passed or something came."""
+        context = self._context
+        deadline = time.monotonic() + (1.0 if to_the_end else _TICK_S)
+        try:
+            item = context.inbox.get(timeout=timeout_s) if timeout_s > 0 else context.inbox.get_nowait()
+            while True:
+                self._take(item)
+                if time.monotonic() > deadline:
+                    return
+                item = context.inbox.get_nowait()
+        except queue.Empty:
+            return
+
+    def _take(self, item: Envelope | Job | None) -> None:
+        if isinstance(item, Envelope):
+            self._context.clock.observe(item.message.time_ns)
+            self._guarded(lambda: self._part.handle(item))
+        elif item is not None:
+            self._guarded(item)
+
+    def _guarded(self, job: Job) -> None:
+        """Publish what the job yields; an error is logged and counted, for nothing sent may stop a process."""
+        try:
+            for envelope in job():
+                self._context.publish(envelope)
+        except Exception as error:
+            self._errors += 1
+            self._context.log.exception("handler failed", error=str(error), count=self._errors)
+
+    def _health(self, *, stopped: bool = False) -> Iterable[Envelope]:
+        context = self._context
+        figures = self._part.figures()
+        usage = resource.getrusage(resource.RUSAGE_SELF)
+        self._health_sequence += 1
+        yield Envelope(
+            context.identity.address("health", self._service.name),
+            Health(
+                time_ns=context.clock.now_ns(),
+                sequence=self._health_sequence,
+                service=self._service.name,
+                state="stopped" if stopped else "degraded" if self._errors else figures.state,
+                counters={
+                    **figures.counters,
+                    "handler_errors": self._errors,
+                    "bus_rejected": context.bus.rejected,
+                    "inbox_dropped": context.inbox_dropped,
+                },
+                gauges={
+                    **figures.gauges,
+                    "cpu_s": usage.ru_utime + usage.ru_stime,
+                    "peak_memory_mb": usage.ru_maxrss / 1024,
+                },
+                note=figures.note,
+            ),
+        )

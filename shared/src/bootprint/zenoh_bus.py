@@ -1,0 +1,237 @@
+"""The bus over Eclipse Zenoh: the only module that imports zenoh.
+
+Every process is a *client* of one router per computer; scouting, gossip and shared memory are off. What was
+learned the hard way is kept here: sessions open in a loop that can be interrupted; samples leave zenoh through a
+channel and one thread per subscription (a slow plain callback would stall the whole session and keep the process
+from exiting); on closing, the session goes first and the threads are joined after it.
+"""
+
+import json
+import threading
+import time
+from collections.abc import Callable
+
+import zenoh
+from zenoh import ext
+
+from bootprint import wire
+from bootprint.bus import Envelope, Handler
+from bootprint.errors import BusError, WireError
+from bootprint.topics import BY_SUBJECT, Address, Identity, Qos, parse_key
+
+RawHandler = Callable[[str, bytes], None]
+_CHANNEL_SIZE = 4096
+_CACHED_SAMPLES = {Qos.ASSURED: 64, Qos.STATE: 1}
+_MISS_HEARTBEAT_S = 0.5
+_RETRY_S = 0.2
+
+_Publisher = zenoh.Publisher | ext.AdvancedPublisher
+
+
+def _client_config(router: str) -> zenoh.Config:
+    return zenoh.Config.from_json5(
+        json.dumps(
+            {
+                "mode": "client",
+                "connect": {
+                    "endpoints": [router],
+                    "timeout_ms": 0,
+                    "exit_on_failure": True,
+                    "retry": {
+                        "period_init_ms": 200,
+                        "period_max_ms": 2000,
+                        "period_increase_factor": 2,
+                    },
+                },
+                "listen": {"endpoints": []},
+                "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+                "transport": {"shared_memory": {"enabled": False}},
+            }
+        )
+    )
+
+
+def _router_config(endpoint: str) -> zenoh.Config:
+    return zenoh.Config.from_json5(
+        json.dumps(
+            {
+                "mode": "router",
+                "listen": {"endpoints": [endpoint]},
+                "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+                "transport": {"shared_memory": {"enabled": False}},
+            }
+        )
+    )
+
+
+class EmbeddedRouter:
+    """A zenoh router inside this process (~22 MB); it routes in its own threads until closed."""
+
+    def __init__(self, endpoint: str) -> None:
+        """Listen at ``endpoint`` such as ``tcp/127.0.0.1:7447``; BusError if that is taken or malformed."""
+        try:
+            self._session = zenoh.open(_router_config(endpoint))
+        except zenoh.ZError as error:
+            raise BusError(f"cannot start a router at {endpoint}: {_first_line(error)}") from error
+        self.endpoint = endpoint
+
+    def close(self) -> None:
+        """Stop routing."""
+        self._session.close()
+
+
+def open_bus(
+    router: str,
+    *,
+    timeout_s: float = 5.0,
+    lossless: bool = False,
+    should_stop: Callable[[], bool] | None = None,
+) -> "ZenohBus":
+    """Connect to a router, waiting for it up to ``timeout_s``; BusError says what to do if none answers.
+
+    ``lossless``: publishers wait instead of dropping and subscribers push back, for replay as fast as possible.
+    """
+    deadline = time.monotonic() + timeout_s
+    config = _client_config(router)
+    while True:
+        try:
+            return ZenohBus(zenoh.open(config), lossless=lossless)
+        except zenoh.ZError as error:
+            stopping = should_stop is not None and should_stop()
+            if stopping or time.monotonic() >= deadline:
+                raise BusError(
+                    f"no router at {router} (waited {timeout_s:g} s): start one with `bootprint router` "
+                    "or name another with --router"
+                ) from error
+        time.sleep(_RETRY_S)
+
+
+class ZenohBus:
+    """Envelopes over one zenoh session; made by `open_bus`."""
+
+    def __init__(self, session: zenoh.Session, *, lossless: bool) -> None:
+        self._session = session
+        self._lossless = lossless
+        self._publishers: dict[Address, _Publisher] = {}
+        self._subscribers: list[object] = []
+        self._tokens: list[zenoh.LivelinessToken] = []
+        self._threads: list[threading.Thread] = []
+        self._lock = threading.Lock()
+        self._closed = False
+        self.rejected = 0
+        """Messages that were no valid message of their topic (counted, dropped)."""
+
+    def publish(self, envelope: Envelope) -> None:
+        """Send one message by its topic's quality of service; from any thread."""
+        payload = wire.encode(envelope.message)
+        publisher = self._publishers.get(envelope.address) or self._declare(envelope.address)
+        try:
+            publisher.put(payload)
+        except zenoh.ZError as error:
+            if not self._closed:
+                raise BusError(f"cannot publish {envelope.address.key}: {_first_line(error)}") from error
+
+    def _declare(self, address: Address) -> _Publisher:
+        with self._lock:
+            if address not in self._publishers:
+                self._publishers[address] = self._new_publisher(address)
+            return self._publishers[address]
+
+    def _new_publisher(self, address: Address) -> _Publisher:
+        control = zenoh.CongestionControl.BLOCK if self._lossless else zenoh.CongestionControl.DROP
+        qos = address.topic.qos
+        if qos is Qos.STREAM:
+            return self._session.declare_publisher(address.key, congestion_control=control)
+        return ext.declare_advanced_publisher(
+            self._session,
+            address.key,
+            congestion_control=control,
+            cache=ext.CacheConfig(max_samples=_CACHED_SAMPLES[qos]),
+            sample_miss_detection=ext.MissDetectionConfig(
+                heartbeat=None, sporadic_heartbeat=_MISS_HEARTBEAT_S
+            ),
+            publisher_detection=True,
+        )
+
+    def subscribe(self, selector: str, handler: Handler) -> None:
+        """Call ``handler`` from a thread with every valid message that matches; recover missed events.
+
+        A selector that names its subject gets that topic's care (history and recovery for events and states).
+        """
+
+        def decoded(key: str, payload: bytes) -> None:
+            try:
+                address = parse_key(key)
+                message = wire.decode(address.subject, payload)
+            except WireError:
+                self.rejected += 1
+                return
+            handler(Envelope(address, message))
+
+        self._spawn(self._new_subscriber(selector), decoded)
+
+    def subscribe_raw(self, selector: str, handler: RawHandler) -> None:
+        """Call ``handler(key, payload)`` from a thread with everything that matches, valid or not."""
+        self._spawn(self._session.declare_subscriber(selector, self._channel()), handler)
+
+    def _new_subscriber(
+        self, selector: str
+    ) -> (
+        zenoh.Subscriber[zenoh.handlers.Handler[zenoh.Sample]]
+        | ext.AdvancedSubscriber[zenoh.handlers.Handler[zenoh.Sample]]
+    ):
+        topic = BY_SUBJECT.get(selector.split("/")[4]) if selector.count("/") == 5 else None
+        if topic is None or topic.qos is Qos.STREAM:
+            return self._session.declare_subscriber(selector, self._channel())
+        return ext.declare_advanced_subscriber(
+            self._session,
+            selector,
+            self._channel(),
+            history=ext.HistoryConfig(detect_late_publishers=True, max_samples=_CACHED_SAMPLES[topic.qos]),
+            recovery=ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+        )
+
+    def _channel(
+        self,
+    ) -> "zenoh.handlers.RingChannel[zenoh.Sample] | zenoh.handlers.FifoChannel[zenoh.Sample]":
+        if self._lossless:
+            return zenoh.handlers.FifoChannel(_CHANNEL_SIZE)
+        return zenoh.handlers.RingChannel(_CHANNEL_SIZE)
+
+    def _spawn(
+        self,
+        subscriber: "zenoh.Subscriber[zenoh.handlers.Handler[zenoh.Sample]]"
+        " | ext.AdvancedSubscriber[zenoh.handlers.Handler[zenoh.Sample]]",
+        handler: RawHandler,
+    ) -> None:
+        def drain() -> None:
+            for sample in subscriber.handler:
+                handler(str(sample.key_expr), sample.payload.to_bytes())
+
+        thread = threading.Thread(target=drain, name=f"bus {subscriber.key_expr}", daemon=True)
+        self._subscribers.append(subscriber)
+        self._threads.append(thread)
+        thread.start()
+
+    def declare_alive(self, identity: Identity, service: str) -> None:
+        """Hold a liveliness token for a service until the bus closes or the process dies."""
+        self._tokens.append(self._session.liveliness().declare_token(identity.selector("health", service)))
+
+    def alive(self, selector: str) -> set[str]:
+        """The keys of the liveliness tokens that match (one query of the router)."""
+        replies = self._session.liveliness().get(selector, timeout=1.0)
+        return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
+
+    def close(self) -> None:
+        """Close the session first, then join the threads that drained it; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._session.close()
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join(timeout=2.0)
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().splitlines()[0].split(" at ")[0]
