@@ -35,12 +35,12 @@ class ScaledClock:
         if not speed > 0:
             raise ValueError(f"speed must be positive, got {speed}")
         self._speed = speed
-        self._origin_ns = origin_ns
+        self.origin_ns = origin_ns
         self._host = host
 
     def now_ns(self) -> int:
         """Event time now, UTC ns."""
-        return self._origin_ns + round(self._speed * (self._host() - self._origin_ns))
+        return self.origin_ns + round(self._speed * (self._host() - self.origin_ns))
 
     def observe(self, stamp_ns: int) -> None:
         """Stamps do not move a steady clock."""

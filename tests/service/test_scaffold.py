@@ -1,0 +1,133 @@
+"""The service scaffold as real processes: arguments, health, faults, and every way to end."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from bootprint.bus import Envelope
+from bootprint.messages import Health, Pressure
+from bootprint.topics import Identity
+from bootprint.zenoh_bus import ZenohBus, open_bus
+from support.routers import free_endpoint, running_router
+from support.waiting import wait_until
+
+pytestmark = pytest.mark.processes
+A1 = Identity("bp", "alpha", "a1")
+ECHO = Path(__file__).parents[1] / "support" / "echo_service.py"
+REALM = """
+id = "bp"
+origin = { latitude_deg = 59.0, longitude_deg = 18.0 }
+roster = [{ id = "a1", number = 1, unit = "alpha" }]
+"""
+
+
+def write_config(folder: Path, extra: str = "") -> Path:
+    (folder / "realm.toml").write_text(REALM)
+    path = folder / "computer.toml"
+    path.write_text(f'realm = "realm.toml"\nsoldier = "a1"\n{extra}')
+    return path
+
+
+def start(config: Path, router: str, *extra: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, str(ECHO), "--config", str(config), "--router", router, *extra],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@contextmanager
+def running_echo(config: Path, router: str, *extra: str) -> Iterator[tuple[subprocess.Popen[str], ZenohBus]]:
+    """The service alive, and a bus beside it."""
+    bus = open_bus(router)
+    process = start(config, router, *extra)
+    try:
+        wait_until(lambda: bus.alive(A1.selector("health")), what="the liveliness token")
+        yield process, bus
+    finally:
+        bus.close()
+        process.kill()
+        process.communicate()
+
+
+def end_of(process: subprocess.Popen[str]) -> tuple[int, str]:
+    _, errors = process.communicate(timeout=15)
+    return process.returncode, errors
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signals_end_it_cleanly_and_its_last_word_is_stopped(tmp_path: Path, number: signal.Signals) -> None:
+    with running_router() as router, running_echo(write_config(tmp_path), router) as (process, bus):
+        health: list[Health] = []
+        bus.subscribe(A1.selector("health"), lambda e: health.append(e.message))
+        wait_until(lambda: health, what="health")
+        process.send_signal(number)
+        code, errors = end_of(process)
+        assert code == 0
+        assert "Traceback" not in errors
+        wait_until(lambda: health[-1].state == "stopped")
+
+
+def test_closing_its_input_ends_it(tmp_path: Path) -> None:
+    with (
+        running_router() as router,
+        running_echo(write_config(tmp_path), router, "--stop-on-eof") as (process, _),
+    ):
+        assert process.stdin
+        process.stdin.close()
+        process.stdin = None
+        assert end_of(process)[0] == 0
+
+
+def test_a_failing_handler_is_counted_and_survived(tmp_path: Path) -> None:
+    with running_router() as router, running_echo(write_config(tmp_path), router) as (_, bus):
+        echoed: list[float] = []
+        health: list[Health] = []
+        bus.subscribe(A1.selector("pressure", "echo"), lambda e: echoed.append(e.message.pressure_pa))
+        bus.subscribe(A1.selector("health"), lambda e: health.append(e.message))
+        address = A1.address("pressure", "baro")
+        for value in (13.0, 1000.0):
+            bus.publish(Envelope(address, Pressure(time_ns=1, pressure_pa=value)))
+        wait_until(lambda: 1000.0 in echoed, what="the message after the failure")
+        wait_until(lambda: health and health[-1].counters["handler_errors"] == 1)
+        assert health[-1].state == "degraded"
+        assert health[-1].gauges["peak_memory_mb"] > 1.0
+
+
+def test_no_router_is_one_line_and_exit_2(tmp_path: Path) -> None:
+    code, errors = end_of(start(write_config(tmp_path), free_endpoint(), "--router-wait", "0.3"))
+    assert code == 2
+    assert errors.startswith("echo: no router at tcp/")
+    assert len(errors.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("extra", "option", "expected"),
+    [
+        ("colour = 1\n", (), "unknown key 'colour'"),
+        ("[gatewy]\n", (), "did you mean 'gateway'"),
+        ("", ("--speed", "fast"), "--speed 'fast'"),
+        ("", ("--log-level", "loud"), "--log-level 'loud'"),
+        ("=", (), "not valid TOML"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(
+    tmp_path: Path, extra: str, option: tuple[str, ...], expected: str
+) -> None:
+    code, errors = end_of(start(write_config(tmp_path, extra), free_endpoint(), *option))
+    assert code == 2
+    assert expected in errors
+    assert len(errors.strip().splitlines()) == 1
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    code, errors = end_of(start(tmp_path / "nowhere.toml", free_endpoint()))
+    assert code == 2
+    assert "nowhere.toml: no such file" in errors

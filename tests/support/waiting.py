@@ -1,0 +1,12 @@
+"""Waiting on conditions: tests never sleep for a guessed time."""
+
+import time
+from collections.abc import Callable
+
+
+def wait_until(condition: Callable[[], object], timeout_s: float = 15.0, what: str = "condition") -> None:
+    """Return as soon as ``condition()`` is true; AssertionError naming ``what`` if it never is."""
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, f"not within {timeout_s} s: {what}"
+        time.sleep(0.01)
