@@ -1,0 +1,21 @@
+# One image for every process of bootprint; the command chooses which.
+#   docker build -t bootprint .
+FROM python:3.11-slim-bookworm AS build
+WORKDIR /src
+COPY constraints.txt ./
+RUN python -m venv /opt/bootprint \
+ && /opt/bootprint/bin/pip install --no-cache-dir --quiet --constraint constraints.txt pip hatchling editables
+COPY shared shared
+COPY services services
+COPY proving-ground proving-ground
+RUN /opt/bootprint/bin/pip install --no-cache-dir --quiet --constraint constraints.txt --no-build-isolation \
+    ./shared ./services/sensor-gateway ./services/pdr-engine ./services/fusion ./services/sa-hub ./proving-ground
+
+FROM python:3.11-slim-bookworm
+COPY --from=build /opt/bootprint /opt/bootprint
+RUN useradd --system --uid 10001 --create-home bootprint && install -d -o bootprint /var/lib/bootprint
+ENV PATH=/opt/bootprint/bin:$PATH PYTHONUNBUFFERED=1 NUMBA_CACHE_DIR=/var/lib/bootprint/numba
+USER bootprint
+WORKDIR /etc/bootprint
+ENTRYPOINT []
+CMD ["bootprint", "--help"]

@@ -1,0 +1,1 @@
+"""Exercises: several soldiers at once, on stage as real processes, watched, scored and shown."""

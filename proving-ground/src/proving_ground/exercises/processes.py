@@ -1,0 +1,113 @@
+"""Real operating-system processes of an exercise: started with a line to their parent, stopped without remains.
+
+Every child runs with ``--stop-on-eof`` and a pipe on its standard input: when the parent dies, however it dies,
+the pipe closes and the child ends. A normal stop closes the pipes, waits, then terminates, then kills.
+"""
+
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from bootprint.errors import BootprintError
+
+_GRACE_S = 6.0
+
+
+class ProcessError(BootprintError):
+    """A process of the exercise could not be started or ended early."""
+
+
+@dataclass(frozen=True)
+class ProcessSpec:
+    """A service to run: the command (a console script of this installation), its arguments and its log file."""
+
+    name: str
+    command: str
+    arguments: tuple[str, ...]
+    log: Path
+
+
+class ProcessGroup:
+    """The processes of one exercise; a context manager that leaves none behind."""
+
+    def __init__(self) -> None:
+        self._running: dict[str, tuple[ProcessSpec, subprocess.Popen[bytes]]] = {}
+
+    def start(self, spec: ProcessSpec) -> None:
+        """Start one process; ProcessError if its command is not installed."""
+        with spec.log.open("wb") as log:
+            process = subprocess.Popen(
+                [_find(spec.command), *spec.arguments, "--stop-on-eof"],
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # Ctrl-C reaches the parent, which then stops its children in order
+            )
+        self._running[spec.name] = (spec, process)
+
+    @property
+    def pids(self) -> dict[str, int]:
+        """Process id by name."""
+        return {name: process.pid for name, (_, process) in self._running.items()}
+
+    def failed(self) -> list[str]:
+        """One line for each process that ended with an error: its name, exit code and last words."""
+        return [
+            f"{name} ended with exit code {process.returncode}: {_last_line(spec.log)}"
+            for name, (spec, process) in self._running.items()
+            if process.poll() not in (None, 0)
+        ]
+
+    def check(self) -> None:
+        """ProcessError if any process has ended with an error."""
+        if lines := self.failed():
+            raise ProcessError("; ".join(lines))
+
+    def stop(self) -> None:
+        """End all: close their input, then terminate, then kill; returns when none is left."""
+        processes = [process for _, process in self._running.values()]
+        for process in processes:
+            if process.stdin:
+                process.stdin.close()
+        for force in (None, subprocess.Popen.terminate, subprocess.Popen.kill):
+            if force is not None:
+                for process in processes:
+                    if process.poll() is None:
+                        force(process)
+            if _all_ended(processes, _GRACE_S):
+                return
+
+    def __enter__(self) -> "ProcessGroup":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+def _all_ended(processes: list[subprocess.Popen[bytes]], within_s: float) -> bool:
+    deadline = time.monotonic() + within_s
+    for process in processes:
+        try:
+            process.wait(max(0.0, deadline - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            return False
+    return True
+
+
+def _find(command: str) -> str:
+    beside = Path(sys.executable).parent / command
+    found = str(beside) if beside.exists() else shutil.which(command)
+    if found is None:
+        raise ProcessError(f"command {command!r} is not installed here; run `make setup`")
+    return found
+
+
+def _last_line(log: Path) -> str:
+    lines = log.read_text(errors="replace").strip().splitlines()
+    return lines[-1] if lines else "(no output)"

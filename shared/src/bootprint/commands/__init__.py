@@ -1,0 +1,1 @@
+"""What the `bootprint` command does, one module a subject."""

@@ -1,0 +1,46 @@
+"""Options that several commands share, and what they mean."""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from bootprint.config import ComputerFile
+from bootprint.errors import ConfigError
+
+DEFAULT_ROUTER: str = next(
+    field.default for field in msgspec.structs.fields(ComputerFile) if field.name == "router"
+)
+
+Router = Annotated[str, typer.Option("--router", help="Router to connect to.", metavar="ENDPOINT")]
+Duration = Annotated[
+    float | None, typer.Option("--duration", help="Stop after this many seconds.", metavar="S", min=0.0)
+]
+Json = Annotated[
+    str | None, typer.Option("--json", help="Write rows as JSON to FILE, or - for standard output.")
+]
+
+
+def parse_speed(speed: str) -> float:
+    """``--speed`` as a factor of event time over host time, infinite for ``max``."""
+    try:
+        factor = math.inf if speed == "max" else float(speed)
+    except ValueError:
+        factor = math.nan
+    if not factor > 0 or (factor == math.inf and speed != "max"):
+        raise ConfigError(f"--speed {speed!r} must be a positive number or 'max'")
+    return factor
+
+
+def write_json(value: object, target: str) -> None:
+    """Write a value as JSON to a file, or to standard output if ``target`` is ``-``."""
+    text = msgspec.json.format(msgspec.json.encode(value), indent=2).decode()
+    if target == "-":
+        typer.echo(text)
+        return
+    try:
+        Path(target).write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"--json {target}: cannot be written: {error.strerror}") from error
