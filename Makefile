@@ -38,6 +38,12 @@ format: $(READY) ## let ruff format and mend
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+golden: $(READY) ## write the golden outputs anew (ARGS=--walk: the small recording too); review the difference
+	PYTHONPATH=tests $(BIN)/python -m support.golden $(ARGS)
+
+figures: $(READY) ## make anew the figures and generated pages of the documents
+	$(BIN)/bootprint topics > docs/topics.md
+
 constraints: ## write constraints.txt anew from a fresh environment (newest versions)
 	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new
 	$(VENV)-new/bin/python -m pip install --quiet --upgrade pip hatchling editables

@@ -1,14 +1,14 @@
 """What a service knows of the bus: envelopes in, envelopes out. `MemoryBus` is the deterministic one."""
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol
 
 from bootprint import wire
 from bootprint.messages import Message
-from bootprint.topics import Address
+from bootprint.topics import Address, parse_key
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +91,13 @@ class MemoryBus:
 
         for selector in selectors:
             self.subscribe(selector, handler)
+
+    def replayed(self, subject: str) -> Iterator[Envelope]:
+        """The messages of one subject in the journal, in order."""
+        for key, payload in self.journal:
+            address = parse_key(key)
+            if address.subject == subject:
+                yield Envelope(address, wire.decode(subject, payload))
 
     def close(self) -> None:
         """Forget all subscriptions."""

@@ -5,8 +5,7 @@ roster and the names of the keys. ``computer.toml`` is this computer's own: who 
 is, and one section for each service, which that service alone understands (`section`).
 """
 
-import difflib
-import re
+import math
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,16 +13,22 @@ from typing import Annotated, Any, TypeVar
 
 import msgspec
 
+from bootprint.config_errors import explain
 from bootprint.errors import ConfigError
 from bootprint.messages import Latitude, Longitude
 from bootprint.topics import Identity, check_part
 
 T = TypeVar("T")
-_UNKNOWN = re.compile(r"Object contains unknown field `(?P<key>[^`]*)`(?: - at `(?P<at>[^`]*)`)?")
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Base of every configuration table: unknown keys are refused."""
+    """Base of every configuration table: unknown keys are refused, and so is TOML's ``nan``."""
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            value = getattr(self, name)
+            if isinstance(value, float) and math.isnan(value):
+                raise ValueError(f"{name} is nan, expected a number")
 
 
 class Origin(Config, frozen=True):
@@ -162,46 +167,4 @@ def convert(values: object, type_: type[T], where: str) -> T:
     try:
         return msgspec.convert(values, type_)
     except msgspec.ValidationError as error:
-        raise ConfigError(f"{where}: {_explain(str(error), values, type_)}") from error
-
-
-def _explain(message: str, values: object, type_: type) -> str:
-    """Turn msgspec's message into a sentence with the place and, for an unknown key, the nearest known one."""
-    unknown = _UNKNOWN.match(message)
-    if not unknown:
-        return message.replace(" - at `$.", " (at ").replace(" - at `$", " (at ").replace("`", "") + (
-            ")" if " - at " in message else ""
-        )
-    key, at = unknown["key"], unknown["at"] or "$"
-    known = _keys_at(type_, at)
-    nearest = difflib.get_close_matches(key, known, n=1)
-    hint = (
-        f"; did you mean {nearest[0]!r}?" if nearest else f"; known keys: {', '.join(known)}" if known else ""
-    )
-    place = at.removeprefix("$").removeprefix(".")
-    return f"unknown key {key!r}{f' in {place}' if place else ''}{hint}"
-
-
-def _keys_at(type_: object, at: str) -> list[str]:
-    """The known keys of the table at a msgspec path such as ``$.sources[...].port``."""
-    for part in re.findall(r"\.([A-Za-z0-9_]+)|\[(?:\.\.\.|\d+)\]", at):
-        if part:
-            info = msgspec.inspect.type_info(type_)
-            fields = {f.encode_name: f for f in getattr(info, "fields", ())}
-            if part not in fields:
-                return []
-            type_ = _element(fields[part].type)
-        else:
-            continue
-    info = msgspec.inspect.type_info(type_) if not isinstance(type_, msgspec.inspect.Type) else type_
-    return [f.encode_name for f in getattr(info, "fields", ())]
-
-
-def _element(info: msgspec.inspect.Type) -> object:
-    """The struct type inside a field's type: through arrays, optionals and unions."""
-    inner = getattr(info, "item_type", None) or next(
-        (t for t in getattr(info, "types", ()) if isinstance(t, msgspec.inspect.StructType)), None
-    )
-    if inner is not None:
-        return _element(inner)
-    return getattr(info, "cls", object)
+        raise ConfigError(f"{where}: {explain(str(error), values, type_)}") from error

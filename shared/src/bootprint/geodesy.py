@@ -6,6 +6,10 @@ import pymap3d
 
 from bootprint.config import Origin
 
+_TURN = 2.0 * math.pi
+_SEMI_MAJOR_M = 6_378_137.0
+_ECCENTRICITY_SQUARED = 6.694379990141316e-3
+
 
 class LocalFrame:
     """ENU metres around an origin (WGS84, ellipsoidal height); a tangent plane, good to ~1 cm/km² of curvature."""
@@ -29,14 +33,34 @@ class LocalFrame:
 
 def wrap_angle(angle_rad: float) -> float:
     """The same angle in (−π, π]."""
-    return math.pi - (math.pi - angle_rad) % (2.0 * math.pi)
+    wrapped = math.pi - (math.pi - angle_rad) % _TURN
+    # A tiny negative number modulo a turn rounds to the whole turn.
+    return wrapped if wrapped > -math.pi else math.pi
 
 
 def azimuth_of(east: float, north: float) -> float:
     """Azimuth of a direction, radians clockwise from true north, in [0, 2π)."""
-    return math.atan2(east, north) % (2.0 * math.pi)
+    azimuth = math.atan2(east, north) % _TURN
+    return azimuth if azimuth < _TURN else 0.0
 
 
 def yaw_of_azimuth(azimuth_rad: float) -> float:
     """Mathematical yaw (counter-clockwise from east) of an azimuth (clockwise from north); its own inverse."""
     return wrap_angle(math.pi / 2.0 - azimuth_rad)
+
+
+def ground_offset(
+    from_deg: tuple[float, float], to_deg: tuple[float, float], height_m: float = 0.0
+) -> tuple[float, float]:
+    """(east, north) metres on the ground between two near (latitude, longitude), across the antimeridian too.
+
+    Radii of curvature at the middle latitude: good to 1e-6 of the distance up to some kilometres, and a hundred
+    times as fast as a change of frames.
+    """
+    middle = math.radians(0.5 * (from_deg[0] + to_deg[0]))
+    flattening = 1.0 - _ECCENTRICITY_SQUARED * math.sin(middle) ** 2
+    normal_m = _SEMI_MAJOR_M / math.sqrt(flattening)
+    meridian_m = normal_m * (1.0 - _ECCENTRICITY_SQUARED) / flattening
+    turn = wrap_angle(math.radians(to_deg[1] - from_deg[1]))
+    east = (normal_m + height_m) * math.cos(middle) * turn
+    return east, (meridian_m + height_m) * math.radians(to_deg[0] - from_deg[0])

@@ -14,6 +14,8 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from bootprint import constraints
+
 Float64Array = npt.NDArray[np.float64]
 Int64Array = npt.NDArray[np.int64]
 
@@ -21,7 +23,8 @@ Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
 Longitude = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
 Percent = Annotated[float, msgspec.Meta(ge=0.0, le=100.0)]
-Count = Annotated[int, msgspec.Meta(ge=0)]
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
+TimeNs = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 Vector3 = tuple[float, float, float]
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
 
@@ -32,24 +35,14 @@ TrackState = Literal["fresh", "stale", "lost"]
 ServiceState = Literal["starting", "ok", "degraded", "failed", "stopped"]
 
 
-def _all_finite(value: object) -> bool:
-    if isinstance(value, float):
-        return math.isfinite(value)
-    if isinstance(value, tuple):
-        return all(_all_finite(item) for item in value)
-    return True
-
-
 class Message(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """What all messages carry: the event's time (UTC ns, by the sensor's stamp) and a count per source."""
 
-    time_ns: int
+    time_ns: TimeNs
     sequence: Count = 0
 
     def __post_init__(self) -> None:
-        for field in self.__struct_fields__:
-            if not _all_finite(getattr(self, field)):
-                raise ValueError(f"{field} is not finite")
+        constraints.check(self)
 
 
 def _packed(values: npt.ArrayLike, dtype: str, columns: int | None) -> bytes:
@@ -155,7 +148,7 @@ class CameraMotion(Message, frozen=True):
     (translation m, rotation vector rad), None if unknown.
     """
 
-    start_time_ns: int
+    start_time_ns: TimeNs
     translation_m: Vector3
     rotation_rad: Vector3
     covariance: Annotated[tuple[float, ...], msgspec.Meta(min_length=21, max_length=21)] | None = None
@@ -179,7 +172,7 @@ class FootStep(Message, frozen=True):
     every half second as a step of (nearly) zero displacement with motion class "standing".
     """
 
-    start_time_ns: int
+    start_time_ns: TimeNs
     displacement_m: Vector3
     heading_change_rad: float
     covariance: Annotated[tuple[float, ...], msgspec.Meta(min_length=10, max_length=10)]
@@ -201,7 +194,7 @@ class FootPose(Message, frozen=True):
 class BodyStep(Message, frozen=True):
     """One step seen by a body-worn unit (compass, gyro, barometer)."""
 
-    start_time_ns: int
+    start_time_ns: TimeNs
     length_m: NonNegative
     length_sigma_m: NonNegative
     azimuth_rad: float
@@ -268,7 +261,7 @@ class Track(Message, frozen=True):
     mode: Mode = "boots"
     floor: int | None = None
     callsign: str | None = None
-    received_ns: int | None = None
+    received_ns: TimeNs | None = None
     via: Name = "own"
     hops: Count = 0
 

@@ -6,9 +6,7 @@ through one inbox, `tick` comes with host time, outputs go to the bus. So a core
 
 import queue
 import resource
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -24,6 +22,7 @@ from bootprint.clock import EventClock, make_clock
 from bootprint.config import Computer, load_computer
 from bootprint.errors import BootprintError, ConfigError
 from bootprint.messages import Health, ServiceState
+from bootprint.stopping import Stop
 from bootprint.topics import Identity
 from bootprint.zenoh_bus import ZenohBus, open_bus
 
@@ -128,7 +127,7 @@ class Context:
         self.lossless = options.speed == "max"
         self.inbox: queue.Queue[Envelope | Job | None] = queue.Queue(_INBOX_SIZE)
         self.inbox_dropped = 0
-        self.stopping = threading.Event()
+        self.stopping = Stop()
         self.exit_code = 0
         self._bus: ZenohBus | None = None
 
@@ -186,7 +185,7 @@ class Context:
     def finish(self, exit_code: int = 0) -> None:
         """Ask the main loop to end."""
         self.exit_code = exit_code
-        self.stopping.set()
+        self.stopping.finish()
 
 
 @dataclass(frozen=True)
@@ -253,7 +252,13 @@ def _check_speed(speed: str) -> None:
 
 def run(service: Service, context: Context) -> int:
     """Run a service until a signal, end of input or its own wish; returns the exit code."""
-    _stop_on_signals(context)
+    with context.stopping as stopping:
+        if context.options.stop_on_eof:
+            stopping.watch_input()
+        return _run(service, context)
+
+
+def _run(service: Service, context: Context) -> int:
     part = service.build(context)
     bus = context.connect()
     try:
@@ -262,26 +267,12 @@ def run(service: Service, context: Context) -> int:
         part.start()
         bus.declare_alive(context.identity, service.name)
         context.log.info("running", router=context.options.router or context.computer.router)
-        if context.options.stop_on_eof:
-            threading.Thread(target=_stop_on_eof, args=(context,), daemon=True).start()
         _Loop(service, part, context).run()
         context.log.info("stopped", exit_code=context.exit_code)
     finally:
-        context.stopping.set()
+        context.stopping.finish()
         bus.close()
     return context.exit_code
-
-
-def _stop_on_signals(context: Context) -> None:
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: context.stopping.set())
-
-
-def _stop_on_eof(context: Context) -> None:
-    """A parent that dies, however it dies, closes our standard input."""
-    while sys.stdin.buffer.read(1024):
-        pass
-    context.stopping.set()
 
 
 class _Loop:

@@ -8,6 +8,7 @@ quality of service and the documentation's table all derive from `TOPICS`.
 import re
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import lru_cache
 
 from bootprint import messages as m
 from bootprint.errors import WireError
@@ -114,6 +115,7 @@ def check_part(name: str, value: str) -> str:
     return value
 
 
+@lru_cache(maxsize=4096)
 def parse_key(key: str) -> Address:
     """Take a key apart; WireError if it is not of this version or names an unknown subject."""
     parts = key.split("/")
@@ -122,4 +124,6 @@ def parse_key(key: str) -> Address:
     realm, _, unit, soldier, subject, source = parts
     if subject not in BY_SUBJECT:
         raise WireError(f"key {key!r} has the unknown subject {subject!r}")
+    if not all(map(_PART.match, (realm, unit, soldier, source))):
+        raise WireError(f"key {key!r} has a part that is not 1 to 64 letters, digits, '_', '-' or '.'")
     return Address(realm, unit, soldier, subject, source)

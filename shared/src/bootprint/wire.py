@@ -3,13 +3,23 @@
 from functools import cache
 
 import msgspec
+import numpy as np
 
 from bootprint.errors import WireError
 from bootprint.messages import Message
 from bootprint.topics import BY_SUBJECT
 
 MAX_MESSAGE_BYTES = 1 << 20
-_ENCODER = msgspec.msgpack.Encoder(order="deterministic")
+
+
+def _plain(value: object) -> object:
+    """NumPy's scalars as Python's: filters compute with them, and forgetting a float() must not stop a process."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"a {type(value).__name__} cannot travel on the bus")
+
+
+_ENCODER = msgspec.msgpack.Encoder(order="deterministic", enc_hook=_plain)
 
 
 @cache

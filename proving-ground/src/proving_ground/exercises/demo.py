@@ -2,12 +2,8 @@
 
 import json
 import math
-import signal
 import sys
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from bootprint.errors import ConfigError
+from bootprint.stopping import Stop
 
 if TYPE_CHECKING:
     from proving_ground.exercises.stage import Stage
@@ -68,7 +65,7 @@ def demo(
 
     exercise = recorded_exercise(data) if data else simulated_exercise(report / "walks", seed)
     length_s = exercise.duration_s + _SETTLE_S if duration is None else duration
-    with stop_on_signals() as stop, Stage(exercise, Play(report, speed, loss)) as stage:
+    with Stop() as stop, Stage(exercise, Play(report, speed, loss)) as stage:
         Runner(stage, length_s, stop, headless=headless).run()
         result = result_of(stage)
     write_report(report, exercise, result)
@@ -91,26 +88,13 @@ def _check(speed: float, loss: float, duration: float | None) -> None:
         raise ConfigError(f"--duration {duration:g} must be a positive number of seconds")
 
 
-@contextmanager
-def stop_on_signals() -> Iterator[threading.Event]:
-    """SIGINT, SIGTERM and SIGHUP set the event instead of ending the process, so that all stops in order."""
-    stop = threading.Event()
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {number: signal.signal(number, lambda *_: stop.set()) for number in numbers}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 @dataclass
 class Runner:
     """Plays a stage to its end, showing it."""
 
     stage: "Stage"
     length_s: float
-    stop: threading.Event
+    stop: Stop
     headless: bool
 
     def run(self) -> None:
@@ -141,7 +125,7 @@ class Runner:
         while self._going():
             if time.monotonic() >= next_line:
                 next_line += _LINE_EVERY_S
-                console.print(view.line(), highlight=False)
+                console.print(view.line(), highlight=False, soft_wrap=True)
             self.stop.wait(0.1)
 
     def _live(self, console: Any) -> None:

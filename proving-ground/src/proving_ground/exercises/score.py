@@ -13,7 +13,7 @@ import numpy.typing as npt
 from bootprint.clock import NS_PER_S
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import LinkReport, Position, Track
-from proving_ground.alignment import RigidFit, fit_rigid
+from proving_ground.evaluation.alignment import RigidFit, fit_rigid
 from proving_ground.exercises.exercise import STOREY_M, Soldier
 from proving_ground.exercises.observer import Heard
 

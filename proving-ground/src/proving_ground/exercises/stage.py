@@ -5,7 +5,6 @@ come over the air.
 """
 
 import socket
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -16,12 +15,14 @@ from types import TracebackType
 from bootprint.clock import NS_PER_S, ScaledClock
 from bootprint.errors import BootprintError
 from bootprint.geodesy import LocalFrame
+from bootprint.stopping import Stop
 from bootprint.zenoh_bus import EmbeddedRouter
+from pdr_engine.foot import warm_up
+from proving_ground.exercises.emulated_radio import EmulatedNet, NetProfile
 from proving_ground.exercises.exercise import COMMAND_POST, LEADER, REALM, Exercise
 from proving_ground.exercises.exercise_files import Ports, write_computer, write_gateway, write_realm
 from proving_ground.exercises.observer import Observer
 from proving_ground.exercises.processes import ProcessGroup, ProcessSpec
-from proving_ground.exercises.radio_net import NetProfile, RadioNet
 
 SQUAD_NET = NetProfile("squad", rate_bits_per_s=9600.0, latency_s=0.05, header_bytes=28, seed=1)
 COMPANY_NET = NetProfile("company", rate_bits_per_s=4800.0, latency_s=0.15, header_bytes=28, seed=2)
@@ -56,7 +57,7 @@ class Stage:
         self._stack = ExitStack()
         self.processes = ProcessGroup()
         self.observers: dict[str, Observer] = {}
-        self.nets: dict[str, RadioNet] = {}
+        self.nets: dict[str, EmulatedNet] = {}
         self._routers: dict[str, str] = {}
 
     @property
@@ -73,6 +74,7 @@ class Stage:
         return self
 
     def _build(self) -> None:
+        warm_up()  # compiles the foot filter once, if nobody has yet, rather than four times at once
         self._start_routers()
         ports = self._start_nets()
         write_realm(self._play.folder, self.exercise)
@@ -99,7 +101,7 @@ class Stage:
         }
         for profile in (SQUAD_NET, COMPANY_NET):
             lossy = NetProfile(**{**profile.__dict__, "loss": self._play.loss})
-            net = RadioNet(lossy, list(members[profile.name].values()), self._play.speed)
+            net = EmulatedNet(lossy, list(members[profile.name].values()), self._play.speed)
             net.start()
             self._stack.callback(net.close)
             self.nets[profile.name] = net
@@ -133,7 +135,7 @@ class Stage:
             )
         )
 
-    def wait_ready(self, stop: threading.Event) -> None:
+    def wait_ready(self, stop: Stop) -> None:
         """Wait until every service lives (or ``stop`` is set); StageError names those that do not."""
         deadline = time.monotonic() + _READY_TIMEOUT_S
         while missing := self._missing():
@@ -151,8 +153,9 @@ class Stage:
         ]
 
     def start_walks(self) -> None:
-        """Start the gateways; all walks begin at ``start_ns`` of event time."""
-        self.start_ns = self.clock.now_ns() + round(_LEAD_S * self._play.speed * NS_PER_S)
+        """Start the gateways; all walks begin at ``start_ns`` of event time, a whole second."""
+        ready_ns = self.clock.now_ns() + round(_LEAD_S * self._play.speed * NS_PER_S)
+        self.start_ns = -(-ready_ns // NS_PER_S) * NS_PER_S
         for soldier in self.exercise.soldiers:
             write_gateway(self._play.folder, soldier, self._routers[soldier.id], self.start_ns)
             self._spawn(soldier.id, "sensor-gateway", "gateway.toml")

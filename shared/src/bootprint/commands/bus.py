@@ -18,7 +18,7 @@ from rich.table import Table
 
 from bootprint.commands.options import DEFAULT_ROUTER, Duration, Json, Router, write_json
 from bootprint.commands.rates import KeyRate, RateMeter
-from bootprint.commands.stopping import Stop
+from bootprint.stopping import Stop
 from bootprint.topics import VERSION
 from bootprint.zenoh_bus import open_bus
 

@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.table import Table
 
 from bootprint.commands.options import DEFAULT_ROUTER, Duration, Json, Router, parse_speed, write_json
-from bootprint.commands.stopping import Stop
 from bootprint.errors import ConfigError, RecordingError
 from bootprint.recording import Recorder, Recording
 from bootprint.salvage import Salvage
+from bootprint.stopping import Stop
 from bootprint.topics import BY_SUBJECT, TOPICS, VERSION, parse_key
 from bootprint.zenoh_bus import ZenohBus, open_bus
 

@@ -1,8 +1,6 @@
 """`bootprint router`: an embedded zenoh router, for a computer without zenohd."""
 
-import signal
 import sys
-import threading
 from typing import Annotated
 
 import typer
@@ -22,22 +20,14 @@ def router(
     Every computer runs one router, and all its services are clients of it. In deployment `zenohd` or the
     image `eclipse/zenoh` does the same.
     """
+    from bootprint.stopping import Stop
     from bootprint.zenoh_bus import EmbeddedRouter
 
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
-    embedded = EmbeddedRouter(listen)
-    try:
-        sys.stderr.write(f"router at {listen}; Ctrl-C stops it\n")
+    with Stop() as stop:
         if stop_on_eof:
-            threading.Thread(target=_wait_eof, args=(stop,), daemon=True).start()
-        stop.wait()
-    finally:
+            stop.watch_input()
+        embedded = EmbeddedRouter(listen)
+        sys.stderr.write(f"router at {listen}; Ctrl-C stops it\n")
+        while not stop.wait(1.0):
+            pass
         embedded.close()
-
-
-def _wait_eof(stop: threading.Event) -> None:
-    while sys.stdin.buffer.read(1024):
-        pass
-    stop.set()

@@ -13,11 +13,12 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 Kind = Literal["foot", "dual", "body", "camera"]
+FEET = ("left_foot", "right_foot")
 
 
 @dataclass(frozen=True, slots=True)
 class ImuSeries:
-    """One inertial unit: ``time_s`` (n,), ``accel_m_s2`` (n, 3), ``gyro_rad_s`` (n, 3), ``mag_ut`` (n, 3) or None."""
+    """One inertial unit: ``time_s`` (n,), ``accel_m_s2``, ``gyro_rad_s`` and, if known, ``mag_ut`` (n, 3)."""
 
     time_s: FloatArray
     accel_m_s2: FloatArray
@@ -30,11 +31,13 @@ class Truth:
     """A reference track: ``time_s`` (k,), ``position_m`` (k, 3) right-handed, z up (NaN where unknown).
 
     ``at_stances``: truth and sensor are different points of the foot, so compare only while the foot stands.
+    ``strides``: how many strides the walk has, where the source counted them.
     """
 
     time_s: FloatArray
     position_m: FloatArray
     at_stances: bool = False
+    strides: int | None = None
 
     @property
     def has_height(self) -> bool:
@@ -67,7 +70,7 @@ class GnssSeries:
 
 @dataclass(frozen=True, slots=True)
 class CameraSeries:
-    """Camera motions: start and end ``(n,)`` s, translation (n, 3) m, rotation vector (n, 3) rad (axes of CameraMotion)."""
+    """Camera motions: start and end (n,) s, translation m and rotation vector rad (n, 3), as in CameraMotion."""
 
     start_time_s: FloatArray
     time_s: FloatArray
@@ -77,7 +80,11 @@ class CameraSeries:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One recording. ``imus`` and ``truth`` are keyed by place: left_foot, right_foot, body."""
+    """One recording. ``imus`` and ``truth`` are keyed by place: left_foot, right_foot, body.
+
+    ``origin`` is (latitude deg, longitude deg, ellipsoidal height m) of the truth's zero, ``source`` who recorded
+    it and under which licence.
+    """
 
     name: str
     kind: Kind
@@ -96,3 +103,29 @@ class Run:
         starts = [imu.time_s[0] for imu in self.imus.values()]
         ends = [imu.time_s[-1] for imu in self.imus.values()]
         return float(max(ends) - min(starts)) if starts else 0.0
+
+    def offers(self, kind: Kind) -> bool:
+        """Whether an estimator of this kind finds its sensors here (a dual run offers both single feet too)."""
+        feet = sum(place in self.imus for place in FEET)
+        wanted = {
+            "foot": feet > 0,
+            "dual": feet == 2,
+            "body": "body" in self.imus,
+            "camera": self.camera is not None,
+        }
+        return wanted[kind]
+
+    def truth_of(self, place: str) -> Truth | None:
+        """The truth of a place; of the body between two feet, or of a foot where only the person's is known."""
+        if place in self.truth:
+            return self.truth[place]
+        if place == "body":
+            return self._midway()
+        return self.truth.get("body")
+
+    def _midway(self) -> Truth | None:
+        left, right = (self.truth.get(place) for place in FEET)
+        if left is None or right is None or not np.array_equal(left.time_s, right.time_s):
+            return None
+        middle = (left.position_m + right.position_m) / 2.0
+        return Truth(left.time_s, middle, at_stances=left.at_stances or right.at_stances)

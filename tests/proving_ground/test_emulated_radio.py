@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from proving_ground.exercises.radio_net import NetProfile, RadioNet
+from proving_ground.exercises.emulated_radio import EmulatedNet, NetProfile
 from support.waiting import wait_until
 
 FAST = NetProfile("test", rate_bits_per_s=1e6, latency_s=0.0)
@@ -14,13 +14,13 @@ FAST = NetProfile("test", rate_bits_per_s=1e6, latency_s=0.0)
 @contextmanager
 def on_air(
     profile: NetProfile, members: int, speed: float = 1.0
-) -> Iterator[tuple[RadioNet, list[socket.socket]]]:
+) -> Iterator[tuple[EmulatedNet, list[socket.socket]]]:
     """A running net and its members' sockets."""
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(members)]
     for each in sockets:
         each.bind(("127.0.0.1", 0))
         each.settimeout(5.0)
-    net = RadioNet(profile, [each.getsockname()[1] for each in sockets], speed)
+    net = EmulatedNet(profile, [each.getsockname()[1] for each in sockets], speed)
     net.start()
     try:
         yield net, sockets

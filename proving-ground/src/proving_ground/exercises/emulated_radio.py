@@ -47,7 +47,7 @@ class _Delivery:
     datagram: bytes = field(compare=False)
 
 
-class RadioNet:
+class EmulatedNet:
     """One net on one loopback port; runs in a thread of its own between `start` and `close`."""
 
     def __init__(self, profile: NetProfile, member_ports: list[int], speed: float = 1.0) -> None:

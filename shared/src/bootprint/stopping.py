@@ -1,6 +1,8 @@
-"""How a command that runs for a while ends: Ctrl-C, SIGTERM or a time limit, all of them cleanly."""
+"""How whatever runs for a while ends: Ctrl-C, SIGTERM, a time limit, a parent that is gone; all of them cleanly."""
 
 import signal
+import sys
+import threading
 import time
 from collections.abc import Callable
 from types import FrameType, TracebackType
@@ -10,7 +12,7 @@ _POLL_S = 0.1
 
 
 class Stop:
-    """While entered, SIGINT and SIGTERM only ask for the end; so does a duration (host seconds) that has passed.
+    """While entered, SIGINT, SIGTERM and SIGHUP only ask for the end; so does a duration (host s) that has passed.
 
     The handler sets a plain flag: setting a `threading.Event` there can deadlock with a wait on it.
     """
@@ -22,7 +24,7 @@ class Stop:
         self._before: dict[signal.Signals, Callable[[int, FrameType | None], Any] | int | None] = {}
 
     def __enter__(self) -> Self:
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             self._before[number] = signal.signal(number, self._ask)
         self.restart()
         return self
@@ -35,6 +37,15 @@ class Stop:
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self._asked = True
+
+    def watch_input(self) -> None:
+        """Ask for the end when standard input closes: a parent that dies, however it dies, closes it."""
+        threading.Thread(target=self._read_to_the_end, name="standard input", daemon=True).start()
+
+    def _read_to_the_end(self) -> None:
+        while sys.stdin.buffer.read(1024):
+            pass
+        self.finish()
 
     def restart(self) -> None:
         """Count the duration from now on."""

@@ -1,0 +1,223 @@
+"""Estimators over recorded runs: one row of figures per run, place and method. No printing, no plotting.
+
+Every run goes through the same core as on the bus, in batches of ten samples. The time per sample is the
+estimator's own processor time: nothing is read meanwhile, and its code is compiled before the clock starts.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import structlog
+
+from bootprint.config import Origin, convert
+from bootprint.errors import ConfigError
+from bootprint.topics import Identity
+from proving_ground.evaluation.alignment import Align, Track, count_strides, true_strides
+from proving_ground.evaluation.consistency import StepChain
+from proving_ground.evaluation.scoring import Scored, score_track
+from sensor_gateway.recordings.run import FEET, ImuSeries, Kind, Run
+
+if TYPE_CHECKING:
+    from pdr_engine.foot import FootStepEstimate
+
+Row = dict[str, str | float | int | None]
+BATCH = 10
+ALL = "all"
+FUSED = "fused"
+BODY = "body"
+_IDENTITY = Identity("evaluate", "evaluate", "evaluate")
+_ORIGIN = Origin(latitude_deg=0.0, longitude_deg=0.0)  # any: only local coordinates are compared
+_NS_PER_S = 1e9
+# Kinds that an estimator exists for; the others say so instead of pretending.
+KINDS: tuple[Kind, ...] = ("foot", "dual")
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What an estimator made of a run: its track, its steps (None if it has none) and what it cost."""
+
+    track: Track
+    steps: StepChain | None
+    strides: int | None
+    samples: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One row to be: a run, the place (left_foot, right_foot) and the method."""
+
+    run: Run
+    kind: Kind
+    place: str
+    method: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluated:
+    """A finished task: its row, and what plots need."""
+
+    task: Task
+    estimate: Estimate
+    scored: Scored
+    row: Row
+
+
+def methods_of(choice: str | None) -> tuple[str, ...]:
+    """The methods to run: the default one, the one named, or all; ConfigError on an unknown name."""
+    from pdr_engine.foot import METHODS, FootSettings
+
+    if choice is None:
+        return (FootSettings().method,)
+    if choice == ALL:
+        return METHODS
+    if choice not in METHODS:
+        raise ConfigError(f"--method {choice!r} is unknown; known: {', '.join((*METHODS, ALL))}")
+    return (choice,)
+
+
+def plan(runs: Sequence[Run], kind: Kind | None, methods: Sequence[str]) -> list[Task]:
+    """Every row to compute, in order: runs, then places, then methods; ConfigError if there is none."""
+    tasks = [task for run in runs for task in _tasks(run, kind or run.kind, methods)]
+    if not tasks:
+        found = ", ".join(sorted({kind or run.kind for run in runs}))
+        raise ConfigError(
+            f"nothing to evaluate: no estimator for kind {found} yet (there are: {', '.join(KINDS)})"
+        )
+    return tasks
+
+
+def _tasks(run: Run, kind: Kind, methods: Sequence[str]) -> Iterator[Task]:
+    if kind not in KINDS:
+        structlog.get_logger().warning("evaluate.no_estimator_yet", run=run.name, kind=kind)
+        return
+    places = [place for place in FEET if place in run.imus]
+    for place in places:
+        name = run.name if len(places) == 1 else f"{run.name}/{place.removesuffix('_foot')}"
+        for method in methods:
+            yield Task(run, kind, place, method, name)
+    if kind == "dual":
+        for method in methods:
+            yield Task(run, kind, FUSED, method, f"{run.name}/{FUSED}")
+
+
+def evaluate_task(task: Task, align: Align) -> Evaluated:
+    """Run one task: estimate, score, and put the figures into a row."""
+    estimate = (
+        estimate_fused(task.run, task.method)
+        if task.place == FUSED
+        else estimate_foot(task.run.imus[task.place], task.method)
+    )
+    truth = task.run.truth_of(BODY if task.place == FUSED else task.place)
+    scored = score_track(estimate.track, truth, align, estimate.steps)
+    strides_true = true_strides(truth) if truth is not None and task.place in task.run.truth else None
+    return Evaluated(task, estimate, scored, _row(task, estimate, scored, strides_true))
+
+
+def _row(task: Task, estimate: Estimate, scored: Scored, strides_true: int | None) -> Row:
+    return {
+        "run": task.name,
+        "kind": task.kind,
+        "method": task.method,
+        "duration_s": task.run.duration_s,
+        **asdict(scored.score),
+        "samples": estimate.samples,
+        "us_per_sample": 1e6 * estimate.seconds / estimate.samples,
+        "strides": estimate.strides,
+        "strides_true": strides_true,
+    }
+
+
+def estimate_foot(imu: ImuSeries, method: str) -> Estimate:
+    """One foot through the inertial navigator, batch by batch as on the bus."""
+    from pdr_engine.foot import FootNavigator, FootSettings, warm_up
+
+    warm_up()
+    navigator = FootNavigator(convert({"method": method}, FootSettings, where="--method"))
+    time_ns = np.round(imu.time_s * _NS_PER_S).astype(np.int64)
+    begin = time.thread_time()
+    outputs = [
+        navigator.process(
+            time_ns[start : start + BATCH],
+            imu.accel_m_s2[start : start + BATCH],
+            imu.gyro_rad_s[start : start + BATCH],
+            None if imu.mag_ut is None else imu.mag_ut[start : start + BATCH],
+        )
+        for start in range(0, len(time_ns), BATCH)
+    ]
+    outputs.append(navigator.finish())
+    seconds = time.thread_time() - begin
+    steps = [step for output in outputs for step in output.steps]
+    return Estimate(
+        track=Track(
+            np.concatenate([output.time_ns for output in outputs]) / _NS_PER_S,
+            np.concatenate([output.position_m for output in outputs]),
+        ),
+        steps=_chain(steps),
+        strides=count_strides(np.array([step.displacement_m for step in steps]).reshape(-1, 3)),
+        samples=len(time_ns),
+        seconds=seconds,
+    )
+
+
+def estimate_fused(run: Run, method: str) -> Estimate:
+    """Both feet through pdr-engine and fusion, messages and all, from a known start; 5 Hz.
+
+    There are no steps to hold the covariance to its word with, so ``inside_95_pct`` and ``nees`` stay unknown.
+    """
+    from fusion.config import FusionConfig
+    from pdr_engine.config import PdrConfig
+    from pdr_engine.foot import warm_up
+    from proving_ground.exercises.inprocess import play_run, positions_of
+
+    warm_up()
+    feet = [place for place in FEET if place in run.imus]
+    pdr = convert({"places": feet, "foot": {"method": method}}, PdrConfig, where="--method")
+    start = {"east_m": 0.0, "north_m": 0.0, "azimuth_deg": 90.0}
+    fusion = convert({"feet": feet, "gnss_sources": [], "start": start}, FusionConfig, where="fused")
+    boots = replace(run, imus={place: run.imus[place] for place in feet}, gnss=None)
+    begin = time.thread_time()
+    bus = play_run(boots, _IDENTITY, _ORIGIN, pdr, fusion, start_ns=0)
+    seconds = time.thread_time() - begin
+    positions = [position for position in positions_of(bus) if position.mode != "unplaced"]
+    return Estimate(
+        track=Track(
+            np.array([position.time_ns for position in positions]) / _NS_PER_S,
+            np.array([(position.east_m, position.north_m, position.up_m) for position in positions]),
+        ),
+        steps=None,
+        strides=None,
+        samples=sum(len(imu.time_s) for imu in boots.imus.values()),
+        seconds=seconds,
+    )
+
+
+def _chain(steps: Sequence["FootStepEstimate"]) -> StepChain | None:
+    if not steps:
+        return None
+    horizontal = np.ix_([0, 1, 3], [0, 1, 3])
+    return StepChain(
+        time_s=np.array([steps[0].start_time_ns, *(step.time_ns for step in steps)]) / _NS_PER_S,
+        displacement_m=np.array([step.displacement_m[:2] for step in steps]),
+        heading_change_rad=np.array([step.heading_change_rad for step in steps]),
+        covariance=np.array([np.asarray(step.covariance)[horizontal] for step in steps]),
+    )
+
+
+def summaries(rows: Sequence[Row]) -> list[Row]:
+    """Per method: n, and median, mean and worst of the rows' 2-D RMSE and final error (None if never known)."""
+    methods = dict.fromkeys(str(row["method"]) for row in rows)
+    return [_summary(method, [row for row in rows if row["method"] == method]) for method in methods]
+
+
+def _summary(method: str, rows: Sequence[Row]) -> Row:
+    summary: Row = {"method": method, "n": len(rows)}
+    for column in ("rmse_m", "final_m", "final_pct"):
+        values = [float(value) for row in rows if (value := row[column]) is not None]
+        for name, figure in (("median", np.median), ("mean", np.mean), ("worst", np.max)):
+            summary[f"{column}_{name}"] = float(figure(values)) if values else None
+    return summary

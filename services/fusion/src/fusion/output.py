@@ -1,0 +1,103 @@
+"""What is published: `Position` messages out of a fused estimate, with reliability, floor and mode."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bootprint.config import Origin
+from bootprint.geodesy import LocalFrame, azimuth_of
+from bootprint.messages import Mode, MotionClass, Position, Vector3, upper_triangle
+from fusion.state import Array
+
+_COURSE_SPEED_M_S = 0.3  # slower than this a course means nothing
+_HALF_RELIABLE_M = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """The fused answer at one moment: ENU m, covariance (3, 3) m², velocity m/s; ``course_sigma_rad`` if known."""
+
+    mode: Mode
+    enu: Vector3
+    covariance: Array
+    velocity: Vector3 = (0.0, 0.0, 0.0)
+    speed_m_s: float = 0.0
+    course_sigma_rad: float | None = None
+    motion: MotionClass = "unknown"
+    sources: tuple[str, ...] = ()
+    rejected: tuple[str, ...] = ()
+
+
+class Publisher:
+    """Turns estimates into messages of one soldier."""
+
+    def __init__(self, origin: Origin, floor_height_m: float | None) -> None:
+        self._frame = LocalFrame(origin)
+        self._floor_height_m = floor_height_m
+        self._sequence = 0
+
+    def position(self, time_ns: int, estimate: Estimate) -> Position:
+        """The message, numbered from zero."""
+        east, north, up = estimate.enu
+        latitude, longitude, height = self._frame.to_geodetic(east, north, up)
+        course, course_sigma = _course(estimate)
+        message = Position(
+            time_ns=time_ns,
+            sequence=self._sequence,
+            mode=estimate.mode,
+            latitude_deg=latitude,
+            longitude_deg=longitude,
+            height_m=height,
+            east_m=east,
+            north_m=north,
+            up_m=up,
+            covariance_m2=_six(estimate.covariance),
+            velocity_m_s=estimate.velocity,
+            speed_m_s=estimate.speed_m_s,
+            course_rad=course,
+            course_sigma_rad=course_sigma,
+            floor=self._floor(estimate),
+            motion=estimate.motion,
+            sources=estimate.sources,
+            rejected=estimate.rejected,
+            reliability_pct=reliability_pct(estimate),
+        )
+        self._sequence += 1
+        return message
+
+    def _floor(self, estimate: Estimate) -> int | None:
+        """Floor by height above the origin (the ground floor's level), if floors are known."""
+        if self._floor_height_m is None or estimate.mode == "unplaced":
+            return None
+        return round(estimate.enu[2] / self._floor_height_m)
+
+
+def horizontal_sigma_m(covariance: Array) -> float:
+    """Root of the larger eigenvalue of the horizontal part, m."""
+    east, north = float(covariance[0, 0]), float(covariance[1, 1])
+    half = 0.5 * (east + north)
+    return math.sqrt(half + math.hypot(0.5 * (east - north), float(covariance[0, 1])))
+
+
+def reliability_pct(estimate: Estimate) -> float:
+    """``100 / (1 + (σ/5 m)²)`` of the horizontal σ; half of it while coasting, 0 when unplaced or lost.
+
+    So 1 m is 96 %, 5 m is 50 %, 15 m is 10 %.
+    """
+    if estimate.mode in ("unplaced", "lost"):
+        return 0.0
+    value = 100.0 / (1.0 + (horizontal_sigma_m(estimate.covariance) / _HALF_RELIABLE_M) ** 2)
+    return 0.5 * value if estimate.mode == "coasting" else value
+
+
+def _course(estimate: Estimate) -> tuple[float | None, float | None]:
+    east, north, _ = estimate.velocity
+    if estimate.course_sigma_rad is None or math.hypot(east, north) < _COURSE_SPEED_M_S:
+        return None, None
+    return azimuth_of(east, north), estimate.course_sigma_rad
+
+
+def _six(covariance: Array) -> tuple[float, float, float, float, float, float]:
+    ee, en, eu, nn, nu, uu = upper_triangle(np.asarray(covariance))
+    return ee, en, eu, nn, nu, uu

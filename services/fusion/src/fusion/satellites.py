@@ -1,0 +1,98 @@
+"""Satellite fixes on their way in: what is a position at all, how sure it is, and what became of it."""
+
+import math
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bootprint.clock import NS_PER_S
+from bootprint.config import Origin
+from bootprint.geodesy import LocalFrame
+from bootprint.messages import GnssFix, Vector3
+from fusion.config import GnssConfig
+from fusion.filter import Innovation
+from fusion.models import gnss
+
+
+@dataclass(frozen=True, slots=True)
+class SatellitePosition:
+    """A fix as a place in ENU, one sigma per axis in m; ``inflation`` of its variance for repeating itself."""
+
+    time_ns: int
+    source: str
+    enu: Vector3
+    sigma_m: float
+    up_sigma_m: float | None
+    inflation: float
+
+
+@dataclass
+class Satellites:
+    """Screens fixes and remembers per receiver when one was last accepted or rejected."""
+
+    config: GnssConfig
+    origin: Origin
+    counters: Counter[str]
+    accepted_ns: dict[str, int] = field(default_factory=dict)
+    rejected_ns: dict[str, int] = field(default_factory=dict)
+    normalised_squared: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._frame = LocalFrame(self.origin)
+
+    def screen(self, source: str, fix: GnssFix) -> SatellitePosition | None:
+        """The fix as a position, or None (counted) if it holds none that can be believed."""
+        if not gnss.has_position(fix) or fix.latitude_deg is None or fix.longitude_deg is None:
+            return self._refused("gnss_without_position")
+        sigma_m = gnss.horizontal_sigma_m(fix, self.config)
+        if sigma_m is None:
+            return self._refused("gnss_without_accuracy")
+        height_m = self.origin.height_m if fix.height_m is None else fix.height_m
+        enu = self._frame.to_enu(fix.latitude_deg, fix.longitude_deg, height_m)
+        if math.hypot(*enu) > 1000.0 * self.config.max_range_km:
+            return self._refused("gnss_out_of_range")
+        up_sigma_m = gnss.vertical_sigma_m(fix, self.config)
+        return SatellitePosition(fix.time_ns, source, enu, sigma_m, up_sigma_m, self._inflation(source, fix))
+
+    def _refused(self, why: str) -> SatellitePosition | None:
+        self.counters[why] += 1
+        return None
+
+    def _inflation(self, source: str, fix: GnssFix) -> float:
+        last_ns = self.accepted_ns.get(source)
+        if last_ns is None:
+            return 1.0
+        return gnss.correlation_inflation((fix.time_ns - last_ns) / NS_PER_S, self.config.correlation_s)
+
+    def placed_by(self, position: SatellitePosition) -> None:
+        """The fix was used to place an unplaced soldier."""
+        self.accepted_ns[position.source] = position.time_ns
+        self.counters["gnss_accepted"] += 1
+
+    def judge(self, position: SatellitePosition, innovation: Innovation) -> None:
+        """Remember the gate's verdict on a fix."""
+        self.normalised_squared = innovation.normalised_squared
+        (self.accepted_ns if innovation.accepted else self.rejected_ns)[position.source] = position.time_ns
+        self.counters["gnss_accepted" if innovation.accepted else "gnss_rejected"] += 1
+
+    def fresh(self, now_ns: int) -> tuple[str, ...]:
+        """Receivers a fix of which was accepted lately."""
+        return tuple(sorted(source for source, at in self.accepted_ns.items() if self._is_fresh(at, now_ns)))
+
+    def refused(self, now_ns: int) -> tuple[str, ...]:
+        """Receivers whose newest verdict is a rejection of lately."""
+        return tuple(
+            sorted(
+                source
+                for source, at in self.rejected_ns.items()
+                if self._is_fresh(at, now_ns) and at > self.accepted_ns.get(source, at - 1)
+            )
+        )
+
+    def silent_s(self, now_ns: int) -> float:
+        """Seconds since any fix was accepted; infinite if none was."""
+        return min(((now_ns - at) / NS_PER_S for at in self.accepted_ns.values()), default=np.inf)
+
+    def _is_fresh(self, at_ns: int, now_ns: int) -> bool:
+        return now_ns - at_ns <= self.config.fresh_s * NS_PER_S

@@ -1,0 +1,114 @@
+"""One boot on the bus: its batches through the navigator, its steps and poses out as messages in event time."""
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from bootprint.bus import Envelope
+from bootprint.messages import FootPose, FootStep, ImuBatch, Vector3, upper_triangle
+from bootprint.topics import Address
+from pdr_engine.foot import FootEstimates, FootNavigator, FootSettings, FootStepEstimate
+
+NS_PER_S = 1_000_000_000
+
+
+class Boot:
+    """The navigator of one place with the books that messages need.
+
+    Steps are numbered from 0. Poses lie on a fixed grid of event time (the first sample at or after each of its
+    points), begin with the first step, and are relative to the newest step at or before their time.
+    """
+
+    def __init__(self, settings: FootSettings, imu: Address, pose_interval_s: float) -> None:
+        self._navigator = FootNavigator(settings)
+        self._step_address = imu.with_subject("foot_step")
+        self._pose_address = imu.with_subject("foot_pose")
+        self._grid_ns = round(pose_interval_s * NS_PER_S)
+        self._cell: int | None = None
+        self._steps = 0
+        self._poses = 0
+        self._position: Vector3 = (0.0, 0.0, 0.0)  # where the newest step ended, nav frame
+        self._yaw_rad = 0.0
+        self._rate_since_ns = 0
+        self._rate_count = 0
+        self.rate_hz = 0.0
+        self.newest_ns: int | None = None
+
+    def handle(self, batch: ImuBatch) -> Iterable[Envelope]:
+        """Take a batch in; steps and poses that it makes known come out."""
+        times = batch.times
+        self._measure_rate(int(times[-1]), len(times))
+        return self._publish(self._navigator.process(times, batch.accel, batch.gyro, batch.mag))
+
+    def close(self) -> Iterable[Envelope]:
+        """The end of the stream: what still waited."""
+        return self._publish(self._navigator.finish())
+
+    def counters(self) -> dict[str, int]:
+        """Counts since the start."""
+        return {**self._navigator.counters(), "steps": self._steps}
+
+    def _measure_rate(self, newest_ns: int, count: int) -> None:
+        self.newest_ns = newest_ns
+        span_ns = newest_ns - self._rate_since_ns
+        self._rate_count += count
+        if not 0 <= span_ns < NS_PER_S:
+            self.rate_hz = self._rate_count * NS_PER_S / span_ns if 0 < span_ns < 2 * NS_PER_S else 0.0
+            self._rate_since_ns, self._rate_count = newest_ns, 0
+
+    def _publish(self, estimates: FootEstimates) -> Iterator[Envelope]:
+        """Steps and poses in the order of their times; a step goes before the pose of its own time."""
+        steps = iter(estimates.steps)
+        step = next(steps, None)
+        for row in self._grid_rows(estimates):
+            while step is not None and step.time_ns <= int(row["time_ns"]):
+                yield self._step(step)
+                step = next(steps, None)
+            if self._steps:
+                yield self._pose(row)
+        while step is not None:
+            yield self._step(step)
+            step = next(steps, None)
+
+    def _grid_rows(self, estimates: FootEstimates) -> Iterator[Any]:
+        """The first estimate in each cell of the grid."""
+        cells = (estimates.time_ns // self._grid_ns).tolist()
+        for index, cell in enumerate(cells):
+            if cell != self._cell:
+                self._cell = cell
+                yield estimates.rows[index]
+
+    def _step(self, step: FootStepEstimate) -> Envelope:
+        forward, left, up = (float(value) for value in step.displacement_m)
+        message = FootStep(
+            time_ns=step.time_ns,
+            sequence=self._steps,
+            start_time_ns=step.start_time_ns,
+            displacement_m=(forward, left, up),
+            heading_change_rad=step.heading_change_rad,
+            covariance=upper_triangle(step.covariance),
+            motion=step.motion,
+            stance_quality=step.stance_quality,
+            realigned=step.realigned,
+        )
+        self._steps += 1
+        cosine, sine = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
+        x, y, z = self._position
+        self._position = (x + cosine * forward - sine * left, y + sine * forward + cosine * left, z + up)
+        self._yaw_rad += step.heading_change_rad
+        return Envelope(self._step_address, message)
+
+    def _pose(self, row: Any) -> Envelope:
+        cosine, sine = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
+        x, y, z = (float(here - there) for here, there in zip(row["position_m"], self._position, strict=True))
+        message = FootPose(
+            time_ns=int(row["time_ns"]),
+            sequence=self._poses,
+            step_sequence=self._steps - 1,
+            displacement_m=(cosine * x + sine * y, cosine * y - sine * x, z),
+            heading_change_rad=math.remainder(float(row["yaw_rad"]) - self._yaw_rad, 2.0 * math.pi),
+            speed_m_s=float(row["speed_m_s"]),
+            in_stance=bool(row["stance"]),
+        )
+        self._poses += 1
+        return Envelope(self._pose_address, message)

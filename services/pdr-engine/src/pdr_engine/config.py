@@ -1,0 +1,34 @@
+"""What can be set under ``[pdr]`` of computer.toml. An empty section is a good one; a foot in detail::
+
+[pdr]
+places = ["right_foot"]
+
+[pdr.foot]
+method = "shoe"
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from bootprint.config import Config
+from pdr_engine.foot.settings import FootSettings
+
+Place = Literal["left_foot", "right_foot", "body"]
+
+
+class PdrConfig(Config, frozen=True):
+    """The ``[pdr]`` section: where inertial units are worn, and how the feet's navigators are set."""
+
+    places: Annotated[tuple[Place, ...], msgspec.Meta(min_length=1, max_length=3)] = (
+        "left_foot",
+        "right_foot",
+    )
+    foot: FootSettings = FootSettings()
+    pose_interval_s: Annotated[float, msgspec.Meta(ge=0.01)] = 0.1  # event time between two FootPoses
+    silent_after_s: Annotated[float, msgspec.Meta(gt=0.0)] = 2.0  # event time until a foot is reported silent
+
+    @property
+    def feet(self) -> tuple[str, ...]:
+        """The places that are feet."""
+        return tuple(place for place in self.places if place != "body")

@@ -1,0 +1,211 @@
+"""The error-state filter: strapdown mechanisation, covariance, zero-velocity update, step-wise reset.
+
+Nominal state: position and velocity (nav axes, z up), attitude (quaternion, sensor to nav), lever arm (sensor
+axes, from the sensor to the point of the sole that stands still). Error state, 12 numbers: δp, δv, δθ (turn of
+nav axes: C = exp([δθ]×)·Ĉ), δl. With the lever arm's sigma at 0 it is the plain 9-state filter of D1.
+After Skog et al. (2010) and the OpenShoe step-wise cascade (Nilsson et al. 2012); REFERENCES.md for the gate
+that inflates. The same equations stand as matrices in tests/support/foot_oracle.py.
+"""
+
+import math
+
+from pdr_engine.foot.compiled import Record, compiled
+from pdr_engine.foot.memory import ATTITUDE, HEADING, LEVER, MASK, POSITION, STATES, VELOCITY
+from pdr_engine.foot.quaternion import assign, from_rotation_vector, multiply, normalised, rotate
+
+UPDATE_INTERVAL_S = 0.005  # the zero-velocity sigma is that of one update at this interval
+BIAS_MEMORY_S = 1.0  # the bias's uncertainty adds up coherently over about a step
+
+
+@compiled
+def mechanise(s: Record, at: int, dt: float) -> None:
+    """Carry the nominal state to sample ``at``, whose rate and force are means over the interval before it.
+
+    Inertial units of this class integrate between their outputs; on the recorded sets this beats the trapezoid.
+    """
+    place = at & MASK
+    x = (s.gyro[place, 0] - s.bias[0]) * dt
+    y = (s.gyro[place, 1] - s.bias[1]) * dt
+    z = (s.gyro[place, 2] - s.bias[2]) * dt
+    middle = multiply(s.attitude, from_rotation_vector(0.5 * x, 0.5 * y, 0.5 * z))
+    end = normalised(multiply(s.attitude, from_rotation_vector(x, y, z)))
+    force = rotate(middle, s.accel[place, 0], s.accel[place, 1], s.accel[place, 2])
+    for axis in range(3):
+        s.force[axis] = force[axis]
+        change = (force[axis] - (s.gravity if axis == 2 else 0.0)) * dt
+        s.position[axis] += (s.velocity[axis] + 0.5 * change) * dt
+        s.velocity[axis] += change
+    assign(s.attitude, end)
+
+
+@compiled
+def _transport(P: Record, s: Record, dt: float, i: int, rows: bool) -> None:
+    """Column i of F·P (``rows``), or row i of P·Fᵀ.
+
+    F: δp += dt·δv − ½dt²·[f]×δθ and δv −= dt·[f]×δθ, with the specific force f in nav axes.
+    """
+    if rows:
+        t0, t1, t2 = P[ATTITUDE, i], P[ATTITUDE + 1, i], P[ATTITUDE + 2, i]
+    else:
+        t0, t1, t2 = P[i, ATTITUDE], P[i, ATTITUDE + 1], P[i, ATTITUDE + 2]
+    f0, f1, f2 = s.force[0] * dt, s.force[1] * dt, s.force[2] * dt
+    dv = (f2 * t1 - f1 * t2, f0 * t2 - f2 * t0, f1 * t0 - f0 * t1)
+    for axis in range(3):
+        if rows:
+            P[POSITION + axis, i] += dt * (P[VELOCITY + axis, i] + 0.5 * dv[axis])
+            P[VELOCITY + axis, i] += dv[axis]
+        else:
+            P[i, POSITION + axis] += dt * (P[i, VELOCITY + axis] + 0.5 * dv[axis])
+            P[i, VELOCITY + axis] += dv[axis]
+
+
+@compiled
+def propagate(s: Record, p: Record, at: int, dt: float, gap: bool) -> None:
+    """P ← F·P·Fᵀ + Q over the interval that ends with sample ``at``."""
+    P = s.P
+    s.bias_variance += p.bias_walk**2 * dt
+    for i in range(STATES):
+        _transport(P, s, dt, i, True)
+    for i in range(STATES):
+        _transport(P, s, dt, i, False)
+    velocity = (p.accel_noise**2 + (p.accel_scale * _shaking(s)) ** 2) * dt
+    angle = (p.gyro_noise**2 + (p.gyro_scale * _turning(s, at)) ** 2 + s.bias_variance * BIAS_MEMORY_S) * dt
+    if gap:
+        velocity += (p.gap_accel * dt) ** 2
+        angle += (p.gap_rate * dt) ** 2
+    for axis in range(3):
+        if gap:
+            P[POSITION + axis, POSITION + axis] += (0.5 * p.gap_accel * dt**2) ** 2
+        P[VELOCITY + axis, VELOCITY + axis] += velocity
+        P[ATTITUDE + axis, ATTITUDE + axis] += angle
+        P[LEVER + axis, LEVER + axis] += p.lever_walk**2 * dt
+        if s.clipped[at & MASK, axis]:
+            _doubt_axis(s, axis, p.clip_noise**2 * dt)
+
+
+@compiled
+def _shaking(s: Record) -> float:
+    """Size of the specific force without gravity, m/s²."""
+    return math.sqrt(s.force[0] ** 2 + s.force[1] ** 2 + (s.force[2] - s.gravity) ** 2)
+
+
+@compiled
+def _turning(s: Record, at: int) -> float:
+    """Size of the angular rate, rad/s."""
+    place = at & MASK
+    return math.sqrt(s.gyro[place, 0] ** 2 + s.gyro[place, 1] ** 2 + s.gyro[place, 2] ** 2)
+
+
+@compiled
+def _doubt_axis(s: Record, axis: int, variance: float) -> None:
+    """Add attitude noise about one sensor axis."""
+    u = rotate(s.attitude, 1.0 * (axis == 0), 1.0 * (axis == 1), 1.0 * (axis == 2))
+    for i in range(3):
+        for j in range(3):
+            s.P[ATTITUDE + i, ATTITUDE + j] += u[i] * u[j] * variance
+
+
+@compiled
+def _measurement(s: Record, at: int) -> tuple[float, float, float]:
+    """Innovation 0 − (v + C(ω×l)) and its Jacobian H = [0, I, −[C(ω×l)]×, C[ω]×] (into ``s.H``)."""
+    H = s.H
+    wx = s.gyro[at & MASK, 0] - s.bias[0]
+    wy = s.gyro[at & MASK, 1] - s.bias[1]
+    wz = s.gyro[at & MASK, 2] - s.bias[2]
+    l0, l1, l2 = s.lever[0], s.lever[1], s.lever[2]
+    u = rotate(s.attitude, wy * l2 - wz * l1, wz * l0 - wx * l2, wx * l1 - wy * l0)
+    columns = (
+        rotate(s.attitude, 0.0, wz, -wy),
+        rotate(s.attitude, -wz, 0.0, wx),
+        rotate(s.attitude, wy, -wx, 0.0),
+    )
+    for i in range(3):
+        H[i, VELOCITY + i] = 1.0
+        for j in range(3):
+            H[i, LEVER + j] = columns[j][i]
+    H[0, ATTITUDE + 1], H[0, ATTITUDE + 2], H[1, ATTITUDE + 2] = u[2], -u[1], u[0]
+    H[1, ATTITUDE], H[2, ATTITUDE], H[2, ATTITUDE + 1] = -u[2], u[1], -u[0]
+    return (-s.velocity[0] - u[0], -s.velocity[1] - u[1], -s.velocity[2] - u[2])
+
+
+@compiled
+def _innovation_inverse(s: Record, variance: float) -> None:
+    """P·Hᵀ into ``s.cross`` and the inverse of H·P·Hᵀ + variance·I into ``s.S``."""
+    P, H, C, S = s.P, s.H, s.cross, s.S
+    for i in range(STATES):
+        for k in range(3):
+            total = P[i, VELOCITY + k]
+            for j in range(ATTITUDE, STATES):
+                total += P[i, j] * H[k, j]
+            C[i, k] = total
+    for k in range(3):
+        for m in range(3):
+            total = C[VELOCITY + k, m]
+            for j in range(ATTITUDE, STATES):
+                total += H[k, j] * C[j, m]
+            S[k, m] = total
+        S[k, k] += variance
+    _invert(S)
+
+
+@compiled
+def _invert(S: Record) -> None:
+    """Invert a symmetric 3x3 matrix in place by its adjugate."""
+    a, b, c = S[0, 0], 0.5 * (S[0, 1] + S[1, 0]), 0.5 * (S[0, 2] + S[2, 0])
+    d, e, f = S[1, 1], 0.5 * (S[1, 2] + S[2, 1]), S[2, 2]
+    A, B, C = d * f - e * e, c * e - b * f, b * e - c * d
+    scale = 1.0 / (a * A + b * B + c * C)
+    S[0, 0], S[1, 1], S[2, 2] = A * scale, (a * f - c * c) * scale, (a * d - b * b) * scale
+    S[0, 1] = S[1, 0] = B * scale
+    S[0, 2] = S[2, 0] = C * scale
+    S[1, 2] = S[2, 1] = (b * c - a * e) * scale
+
+
+@compiled
+def zero_velocity(s: Record, p: Record, at: int, dt: float) -> None:
+    """The sole stands still: update with its velocity 0.
+
+    An innovation beyond ``gate`` sigmas inflates the measurement's noise (Huber's weight): S → (√NIS/gate)·S.
+    The covariance stays symmetric by construction: P −= (P·Hᵀ)·S⁻¹·(P·Hᵀ)ᵀ, computed for one triangle.
+    """
+    y = _measurement(s, at)
+    _innovation_inverse(s, p.velocity_sigma**2 * UPDATE_INTERVAL_S / dt)
+    P, C, K, S = s.P, s.cross, s.gain, s.S
+    nis = 0.0
+    for k in range(3):
+        nis += y[k] * (S[k, 0] * y[0] + S[k, 1] * y[1] + S[k, 2] * y[2])
+    trust = min(1.0, p.gate / math.sqrt(max(nis, 1e-12)))
+    for i in range(STATES):
+        for k in range(3):
+            K[i, k] = trust * (C[i, 0] * S[0, k] + C[i, 1] * S[1, k] + C[i, 2] * S[2, k])
+    for i in range(STATES):
+        for j in range(i, STATES):
+            P[i, j] -= K[i, 0] * C[j, 0] + K[i, 1] * C[j, 1] + K[i, 2] * C[j, 2]
+            P[j, i] = P[i, j]
+    _inject(s, y)
+
+
+@compiled
+def _inject(s: Record, y: tuple[float, float, float]) -> None:
+    """Move the error K·y into the nominal state."""
+    K = s.gain
+    turn = from_rotation_vector(
+        K[ATTITUDE, 0] * y[0] + K[ATTITUDE, 1] * y[1] + K[ATTITUDE, 2] * y[2],
+        K[ATTITUDE + 1, 0] * y[0] + K[ATTITUDE + 1, 1] * y[1] + K[ATTITUDE + 1, 2] * y[2],
+        K[ATTITUDE + 2, 0] * y[0] + K[ATTITUDE + 2, 1] * y[1] + K[ATTITUDE + 2, 2] * y[2],
+    )
+    for axis in range(3):
+        for k in range(3):
+            s.position[axis] += K[POSITION + axis, k] * y[k]
+            s.velocity[axis] += K[VELOCITY + axis, k] * y[k]
+            s.lever[axis] += K[LEVER + axis, k] * y[k]
+    assign(s.attitude, normalised(multiply(turn, s.attitude)))
+
+
+@compiled
+def forget_place(s: Record) -> None:
+    """Step-wise reset: the step handed over carries the doubt about place and heading, what follows starts anew."""
+    for j in range(STATES):
+        for i in range(POSITION, POSITION + 3):
+            s.P[i, j] = s.P[j, i] = 0.0
+        s.P[HEADING, j] = s.P[j, HEADING] = 0.0

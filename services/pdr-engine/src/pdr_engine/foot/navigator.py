@@ -1,0 +1,123 @@
+"""The navigator of one foot: a thin face of the compiled stream.
+
+Nav frame: starts at 0, z up, right-handed. Its x axis is the horizontal direction in which the sensor's x axis
+points at the first alignment (the y axis, if x is steeper than 45°); yaw is the foot's turn about the vertical
+since the start, counter-clockwise, and so is zero there. Where north is, nobody here knows.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bootprint.messages import Float64Array, Int64Array
+from pdr_engine.foot.memory import ESTIMATE, RING, SAMPLE, STEP, fresh_state, parameters
+from pdr_engine.foot.settings import FootSettings
+from pdr_engine.foot.steps import FootStepEstimate, step_from_row
+from pdr_engine.foot.stream import feed
+
+CHUNK = 1024  # samples a call of the kernel
+_ROWS = RING + CHUNK
+COUNTERS = ("accepted", "dropped", "gaps", "clippings", "stances", "realignments")
+
+
+@dataclass(frozen=True, slots=True)
+class FootEstimates:
+    """What one call gave: the samples that became known, one row each, and the steps that ended."""
+
+    rows: npt.NDArray[Any]
+    steps: list[FootStepEstimate]
+
+    @property
+    def time_ns(self) -> Int64Array:
+        """Sample times, shape (k,)."""
+        return self.rows["time_ns"]
+
+    @property
+    def position_m(self) -> Float64Array:
+        """The sensor's place in the nav frame, shape (k, 3)."""
+        return self.rows["position_m"]
+
+    @property
+    def speed_m_s(self) -> Float64Array:
+        """The sensor's speed, shape (k,)."""
+        return self.rows["speed_m_s"]
+
+    @property
+    def yaw_rad(self) -> Float64Array:
+        """The foot's yaw since the start in (−π, π], shape (k,)."""
+        return self.rows["yaw_rad"]
+
+    @property
+    def stance(self) -> npt.NDArray[np.bool_]:
+        """Whether the sample got a zero-velocity update, shape (k,)."""
+        return self.rows["stance"]
+
+
+class FootNavigator:
+    """Dead reckoning of one foot, sample by sample.
+
+    Results come at most 100 ms after their sample (the first ones when the foot has been found at rest, or after
+    a second at the latest) and do not depend on how the samples are cut into batches.
+    """
+
+    def __init__(self, settings: FootSettings | None = None) -> None:
+        self.settings = settings or FootSettings()
+        self._parameters = parameters(self.settings)
+        self._state = fresh_state(self.settings)
+        self._batch = np.zeros(CHUNK, SAMPLE)
+        self._time_ns, self._accel, self._gyro = (self._batch[name] for name in SAMPLE.names or ())
+        self._estimates = np.zeros(_ROWS, ESTIMATE)
+        self._steps = np.zeros(_ROWS, STEP)
+        self._made = self._state["estimates"], self._state["steps"]
+
+    def process(
+        self,
+        time_ns: Int64Array,
+        accel: Float64Array,
+        gyro: Float64Array,
+        mag: Float64Array | None = None,
+    ) -> FootEstimates:
+        """Take a batch of any size: ``time_ns`` (n,) UTC, ``accel`` (n, 3) m/s², ``gyro`` (n, 3) rad/s.
+
+        ``mag`` (n, 3) µT is accepted and not used by this filter.
+        """
+        count = len(time_ns)
+        if count <= CHUNK:
+            self._time_ns[:count] = time_ns
+            self._accel[:count] = accel
+            self._gyro[:count] = gyro
+            return self._feed(count, ends=False)
+        pieces = [
+            self.process(time_ns[i : i + CHUNK], accel[i : i + CHUNK], gyro[i : i + CHUNK])
+            for i in range(0, count, CHUNK)
+        ]
+        rows = np.concatenate([piece.rows for piece in pieces])
+        return FootEstimates(rows, [step for piece in pieces for step in piece.steps])
+
+    def finish(self) -> FootEstimates:
+        """The stream has ended: what still waited for its look-ahead."""
+        return self._feed(0, ends=True)
+
+    def counters(self) -> dict[str, int]:
+        """Counts since the start: samples accepted and dropped, gaps, clipped peaks, stances, realignments."""
+        return {name: int(self._state[name][0]) for name in COUNTERS}
+
+    def _feed(self, count: int, *, ends: bool) -> FootEstimates:
+        feed(self._state, self._parameters, self._batch, count, ends, self._estimates, self._steps)
+        estimates, steps = self._made
+        ended = steps.item()
+        return FootEstimates(
+            self._estimates[: estimates.item()].copy(),
+            [step_from_row(row) for row in self._steps[:ended]] if ended else [],
+        )
+
+
+@cache
+def warm_up() -> None:
+    """Compile the kernel, or load it from disk, before the first sample comes."""
+    navigator = FootNavigator()
+    navigator.process(np.zeros(1, np.int64), np.zeros((1, 3)), np.zeros((1, 3)))
+    navigator.finish()

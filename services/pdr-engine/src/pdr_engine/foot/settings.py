@@ -1,0 +1,88 @@
+"""What can be set on the foot INS, with the defaults and where they come from.
+
+Times are seconds and noise is given as a spectral density, so that nothing depends on the sensor's rate. The
+noise defaults are for the MicroStrain 3DM-GX class on a shoe.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from bootprint.config import Config
+
+Method = Literal["adaptive", "shoe", "gyro", "differential", "ared"]
+METHODS: tuple[str, ...] = ("adaptive", "shoe", "gyro", "differential", "ared")
+
+Positive = Annotated[float, msgspec.Meta(gt=0.0)]
+NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
+
+
+class DetectorSettings(Config, frozen=True):
+    """Thresholds of the stance detectors."""
+
+    # SHOE (Skog 2010): generalised likelihood ratio over 25 ms, the study's weights (REFERENCES.md).
+    shoe_window_s: Positive = 0.025
+    shoe_accel_sigma_m_s2: Positive = 0.00098
+    shoe_gyro_sigma_rad_s: Positive = 8.7e-5
+    shoe_threshold: Positive = 8.5e7  # the fixed threshold of pyshoe
+    # The default: SHOE whose threshold waits after a zero-velocity update and then grows exponentially.
+    adaptive_threshold: Positive = 1e7
+    adaptive_hold_s: NonNegative = 0.5
+    adaptive_rate_per_s: NonNegative = 3.0
+    # D2 (FOI soldiers): RMS of the angular rate over 5 samples at 100 Hz.
+    gyro_window_s: Positive = 0.05
+    gyro_rms_rad_s: Positive = 0.3
+    # ARED: energy of the angular rate over the SHOE window, in the gyro's own sigmas.
+    ared_threshold: Positive = 3e7
+    # C1: the acceleration's total variation in a sliding window (SWS), small for more than ``hold`` in a row.
+    differential_window_s: Positive = 0.05
+    differential_sum_m_s2: Positive = 2.5
+    differential_hold_s: NonNegative = 0.02
+
+
+class AlignmentSettings(Config, frozen=True):
+    """When the foot counts as verified still, and how sure its attitude and gyro bias are then."""
+
+    window_s: Positive = 0.25
+    patience_s: Positive = 1.0  # without such a window by then, align on the quietest moment
+    accel_std_m_s2: Positive = 0.12
+    gyro_std_rad_s: Positive = 0.02
+    rate_rad_s: Positive = 0.02  # a mean rate above this is a turn, not a bias (four of its sigmas)
+    gravity_tolerance_m_s2: Positive = 0.5
+    tilt_sigma_rad: Positive = 0.01
+    quiet_tilt_sigma_rad: Positive = 0.1
+    sway_rad: Positive = 0.0015  # a standing foot rocks by this much: a mean over T is a bias ± sway/T
+    bias_sigma_rad_s: Positive = 0.005  # before anything is known
+    bias_walk_rad_s_sqrt_s: NonNegative = 2e-5
+    stop_s: Positive = 0.5  # a stop this long re-estimates the gyro bias
+
+
+class FilterSettings(Config, frozen=True):
+    """Noise of the error-state filter."""
+
+    accel_noise_m_s2_sqrt_hz: Positive = 0.035
+    gyro_noise_rad_s_sqrt_hz: Positive = 0.0006
+    # What scale errors, bandwidth and shocks add: this part of the force (without gravity) and of the rate.
+    accel_scale_sqrt_s: NonNegative = 0.006
+    gyro_scale_sqrt_s: NonNegative = 0.0
+    zero_velocity_sigma_m_s: Positive = (
+        0.01  # of one update at 200 Hz; scaled so that other rates weigh the same
+    )
+    gate: Positive = 5.0  # innovations beyond this many sigmas inflate the measurement's noise
+    lever_sigma_m: NonNegative = 0.1  # still point of the sole to sensor; 0 leaves a plain 9-state filter
+    lever_walk_m_sqrt_s: NonNegative = 0.0
+    clip_rad_s: Positive = 6.0  # no gyro of this class clips below
+    clip_noise_rad_s_sqrt_hz: NonNegative = 0.07  # 1 rad/s a sample at 200 Hz
+    gap_accel_m_s2: Positive = 10.0  # what a foot may do unseen in a gap of the stream
+    gap_rate_rad_s: Positive = 2.0
+    max_speed_m_s: Positive = 15.0
+
+
+class FootSettings(Config, frozen=True):
+    """All settings of one foot's navigator."""
+
+    method: Method = "adaptive"
+    standing_report_s: Positive = 0.5
+    detector: DetectorSettings = DetectorSettings()
+    alignment: AlignmentSettings = AlignmentSettings()
+    filter: FilterSettings = FilterSettings()

@@ -1,0 +1,289 @@
+"""The compiled stream: samples in, estimates and steps out, one sample after the other.
+
+Every decision depends on the samples accepted so far and never on how they were cut into batches. A sample
+passes three stages: accepted (``head``), made clean and looked at by the detector (``clean``), used by the
+filter (``done``); each stage waits for its look-ahead, together less than 100 ms.
+"""
+
+import math
+from typing import Any
+
+from pdr_engine.foot.alignment import blend_bias, remember_bias, try_align, unrest, verified_still
+from pdr_engine.foot.compiled import Record, compiled
+from pdr_engine.foot.intake import AFTER_LONG_GAP, DROPPED, judge, mend, push
+from pdr_engine.foot.kernel import forget_place, mechanise, propagate, zero_velocity
+from pdr_engine.foot.memory import (
+    ALIGNING,
+    CLIP_LAG_NS,
+    GAP_NS,
+    HEADING,
+    LATENCY_NS,
+    MASK,
+    NS,
+    POSITION,
+    RUNNING,
+    STANCE_END_NS,
+)
+from pdr_engine.foot.quaternion import assign, twist, wrapped
+from pdr_engine.foot.stance import detect
+
+STOP_BLOCK_NS = 500_000_000  # a stop is verified block by block
+
+
+@compiled
+def feed(state: Any, parameters: Any, batch: Any, count: int, ends: bool, estimates: Any, steps: Any) -> None:
+    """Take the first ``count`` rows of ``batch`` (SAMPLE) in; rows of ESTIMATE and STEP come out.
+
+    ``ends``: the stream ends with them, so nothing waits any longer. ``state`` (STATE) and ``parameters``
+    (PARAMETERS) have one row each: numba takes tables from Python in a tenth of the time it needs for single
+    records. The state tells how many ``estimates`` and ``steps`` were written.
+    """
+    s, p = state[0], parameters[0]
+    s.estimates = 0
+    s.steps = 0
+    for i in range(count):
+        sample = batch[i]
+        verdict = judge(s, sample)
+        if verdict == DROPPED:
+            s.dropped += 1
+            s.dropped_in_a_row += 1
+            continue
+        if verdict == AFTER_LONG_GAP:
+            _flush(s, p, estimates, steps)
+            _break_off(s)
+        push(s, sample)
+        _advance(s, p, estimates, steps)
+    if ends:
+        _flush(s, p, estimates, steps)
+
+
+@compiled
+def _flush(s: Record, p: Record, estimates: Any, steps: Any) -> None:
+    """Use what waits, without its look-ahead."""
+    s.flushing = 1
+    if s.mode == ALIGNING and s.head > s.start:
+        try_align(s, p, True)
+    _advance(s, p, estimates, steps)
+    s.flushing = 0
+
+
+@compiled
+def _break_off(s: Record) -> None:
+    """A long gap: align anew with what comes."""
+    if s.mode == RUNNING:
+        s.lost_since_ns = s.time_ns[(s.head - 1) & MASK]
+    s.gaps += 1
+    _realign(s, s.head)
+
+
+@compiled
+def _realign(s: Record, start: int) -> None:
+    """Wait for an alignment with the samples from ``start`` on."""
+    s.mode = ALIGNING
+    s.start = s.done = s.clean = start
+    s.unbroken = max(s.unbroken, start)
+    s.in_stance = 0
+    s.stop_samples = 0
+    if s.aligned:
+        s.realigned = 1
+        s.realignments += 1
+
+
+@compiled
+def _age_ns(s: Record, at: int) -> int:
+    """How old sample ``at`` will be when the next sample comes (the latest moment to act within a look-ahead)."""
+    newest = s.time_ns[(s.head - 1) & MASK]
+    interval = newest - s.time_ns[(s.head - 2) & MASK] if s.head - s.start > 1 else 0
+    return int(newest - s.time_ns[at & MASK] + min(interval, GAP_NS))
+
+
+@compiled
+def _advance(s: Record, p: Record, estimates: Any, steps: Any) -> None:
+    """Let every stage go on as far as its look-ahead allows."""
+    if s.mode == ALIGNING and s.flushing == 0:
+        try_align(s, p, False)
+    while s.mode == RUNNING and s.clean < s.head and (s.flushing or _age_ns(s, s.clean) > CLIP_LAG_NS):
+        mend(s, p, s.clean)
+        detect(s, p, s.clean)
+        s.clean += 1
+    while s.mode == RUNNING and s.done < s.clean and (s.flushing or _age_ns(s, s.done) > LATENCY_NS):
+        _use(s, p, s.done, estimates, steps)
+
+
+@compiled
+def _use(s: Record, p: Record, at: int, estimates: Any, steps: Any) -> None:
+    """The filter's turn of one sample."""
+    place = at & MASK
+    dt = (s.time_ns[place] - s.time_ns[(at - 1) & MASK]) * NS
+    if at == s.start:
+        _begin(s, at)
+    else:
+        mechanise(s, at, dt)
+        propagate(s, p, at, dt, dt > GAP_NS * NS)
+        if s.still[place]:
+            zero_velocity(s, p, at, dt)
+    if _diverged(s, p):
+        _recover(s, at)
+        return
+    s.done += 1
+    s.yaw = twist(s.attitude, s.reference)
+    _write_estimate(s, at, estimates)
+    _watch_stop(s, p, at)
+    _watch_stance(s, p, at, steps)
+
+
+@compiled
+def _begin(s: Record, at: int) -> None:
+    """The first sample after an alignment; a fault belongs to the step it hits, unless the clock was set back."""
+    now_ns = s.time_ns[at & MASK]
+    if s.began == 0 or s.step_time_ns > now_ns:
+        s.step_time_ns = now_ns
+    if s.began == 0:
+        s.began = 1
+        s.step_yaw = twist(s.attitude, s.reference)
+
+
+@compiled
+def _diverged(s: Record, p: Record) -> bool:
+    speed = math.sqrt(s.velocity[0] ** 2 + s.velocity[1] ** 2 + s.velocity[2] ** 2)
+    place = s.position[0] + s.position[1] + s.position[2] + s.attitude[0]
+    return not (math.isfinite(speed) and math.isfinite(place) and speed <= p.max_speed)
+
+
+@compiled
+def _recover(s: Record, at: int) -> None:
+    """Back to where the last step ended, and align anew with the samples from here on."""
+    assign(s.position, s.step_position)
+    s.yaw = s.step_yaw
+    s.lost_since_ns = s.step_time_ns
+    _realign(s, at + 1)
+
+
+@compiled
+def _write_estimate(s: Record, at: int, estimates: Any) -> None:
+    row = estimates[s.estimates]
+    row.time_ns = s.time_ns[at & MASK]
+    row.yaw_rad = s.yaw
+    row.stance = s.still[at & MASK] != 0
+    square = 0.0
+    for axis in range(3):
+        row.position_m[axis] = s.position[axis]
+        square += s.velocity[axis] ** 2
+    row.speed_m_s = math.sqrt(square)
+    s.estimates += 1
+
+
+@compiled
+def _watch_stop(s: Record, p: Record, at: int) -> None:
+    """In a stop that is verified still block by block, learn the gyro bias from the mean rate of the whole stop."""
+    place = at & MASK
+    if s.still[place] == 0 or at == s.unbroken:
+        s.stop_samples = 0
+        return
+    if s.stop_samples == 0:
+        s.stop_since_ns = s.time_ns[place]
+        s.stop_unrest = 0.0
+        remember_bias(s)
+        assign(s.stop_sum, (0.0, 0.0, 0.0))
+        s.stop_block = at
+    for axis in range(3):
+        s.stop_sum[axis] += s.gyro[place, axis]
+    s.stop_samples += 1
+    if s.time_ns[place] - s.time_ns[s.stop_block & MASK] >= STOP_BLOCK_NS:
+        _end_block(s, p, at)
+
+
+@compiled
+def _end_block(s: Record, p: Record, at: int) -> None:
+    """Half a second of the stop is over: go on if it was still, begin a new stop if not."""
+    if not verified_still(s, p, max(s.stop_block, at - MASK // 2), at):
+        s.stop_samples = 0
+        return
+    s.stop_unrest = max(s.stop_unrest, unrest(s, s.stop_block, at))
+    s.stop_block = at
+    span_ns = s.time_ns[at & MASK] - s.stop_since_ns
+    if span_ns >= p.stop_ns:
+        for axis in range(3):
+            s.rate[axis] = s.stop_sum[axis] / s.stop_samples
+        blend_bias(s, p, s.rate, span_ns * NS, s.stop_unrest)
+
+
+@compiled
+def _watch_stance(s: Record, p: Record, at: int, steps: Any) -> None:
+    """Keep the books of stances, and hand a step over when a stance ends or goes on for long."""
+    place = at & MASK
+    now_ns = s.time_ns[place]
+    if s.still[place] == 0:
+        if at > s.start:
+            s.step_swing_ns += now_ns - s.time_ns[(at - 1) & MASK]
+        s.in_stance = 0
+        return
+    if s.in_stance == 0:
+        s.in_stance = 1
+        s.stance_since_ns = now_ns
+        s.stances += 1
+    s.stance_doubt += s.doubt[place]
+    s.stance_samples += 1
+    goes_on_long = now_ns - max(s.stance_since_ns, s.step_time_ns) >= p.report_ns
+    if goes_on_long or _stance_ends(s, at):
+        _hand_over(s, at, steps)
+
+
+@compiled
+def _stance_ends(s: Record, at: int) -> bool:
+    """Whether nothing soon after sample ``at`` belongs to the stance."""
+    limit_ns = s.time_ns[at & MASK] + STANCE_END_NS
+    k = at + 1
+    while k < s.clean and s.time_ns[k & MASK] <= limit_ns:
+        if s.still[k & MASK]:
+            return False
+        k += 1
+    return True
+
+
+@compiled
+def _hand_over(s: Record, at: int, steps: Any) -> None:
+    """Write the step from the last hand-over to sample ``at``, and reset what the step has taken along."""
+    row = steps[s.steps]
+    row.start_time_ns = s.step_time_ns
+    row.time_ns = s.time_ns[at & MASK]
+    cosine, sine = math.cos(s.step_yaw), math.sin(s.step_yaw)
+    x, y = s.position[0] - s.step_position[0], s.position[1] - s.step_position[1]
+    row.displacement_m[0] = cosine * x + sine * y
+    row.displacement_m[1] = cosine * y - sine * x
+    row.displacement_m[2] = s.position[2] - s.step_position[2]
+    row.heading_change_rad = wrapped(s.yaw - s.step_yaw)
+    _write_covariance(s, row, cosine, sine)
+    row.swing_ns = s.step_swing_ns
+    row.doubt = s.stance_doubt / max(1, s.stance_samples)
+    row.realigned = s.realigned != 0
+    s.steps += 1
+    _next_step(s, at)
+
+
+@compiled
+def _write_covariance(s: Record, row: Record, cosine: float, sine: float) -> None:
+    """The 4x4 covariance of (forward, left, up, heading): the filter's, turned into the step's axes."""
+    for i in range(4):
+        a = HEADING if i == 3 else POSITION + i
+        for j in range(4):
+            b = HEADING if j == 3 else POSITION + j
+            row.covariance[i, j] = s.P[a, b]
+    for j in range(4):
+        x, y = row.covariance[0, j], row.covariance[1, j]
+        row.covariance[0, j], row.covariance[1, j] = cosine * x + sine * y, cosine * y - sine * x
+    for i in range(4):
+        x, y = row.covariance[i, 0], row.covariance[i, 1]
+        row.covariance[i, 0], row.covariance[i, 1] = cosine * x + sine * y, cosine * y - sine * x
+
+
+@compiled
+def _next_step(s: Record, at: int) -> None:
+    s.step_time_ns = s.time_ns[at & MASK]
+    assign(s.step_position, s.position)
+    s.step_yaw = s.yaw
+    s.step_swing_ns = 0
+    s.stance_doubt = 0.0
+    s.stance_samples = 0
+    s.realigned = 0
+    forget_place(s)

@@ -1,0 +1,279 @@
+"""The hub's core: own messages and heard frames in; tracks, alerts, link reports and frames to send out.
+
+Pure: event time comes with `tick` and `receive`, frames to send wait in `take_frames`. All radio decisions fall on
+a grid of 0.1 s of event time, so they do not depend on how often `tick` is called.
+"""
+
+from collections import Counter, OrderedDict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import msgspec
+
+from bootprint.bus import Envelope
+from bootprint.clock import NS_PER_S
+from bootprint.config import Member, Realm
+from bootprint.messages import Alert, Fix, Message, Observation, Position, Status
+from bootprint.service import Figures
+from bootprint.topics import SUBJECT_OF, Address, Identity
+from sa_hub.radio.content import MAX_HOPS, Condition, Notice, Report, Reports, StatusNotice, one_hop_on
+from sa_hub.radio.net import RadioNet
+from sa_hub.radio.outbox import Key, key_of
+from sa_hub.radio.replay import Memory
+from sa_hub.settings import HubSettings
+from sa_hub.tracks import Ages, Known, SenderClock, SmoothVelocity, Tracks
+from sa_hub.translate import message_of, notice_of, report_of_fix, report_of_position, track_of
+
+STEP_NS: Final = 100_000_000
+_REMEMBERED_NOTICES: Final = 512
+
+
+@dataclass(frozen=True, slots=True)
+class OutgoingFrame:
+    """Bytes for the air, and the link they belong to."""
+
+    link: str
+    data: bytes
+
+
+class HubCore:
+    """One computer's hub. ``nets``: its radio nets by link name, each with its own seal and budget."""
+
+    def __init__(
+        self, realm: Realm, member: Member, settings: HubSettings, nets: Mapping[str, RadioNet]
+    ) -> None:
+        self.counters: Counter[str] = Counter()
+        self._settings = settings
+        self._member = member
+        self._identity = Identity(realm.id, member.unit, member.id)
+        self._roster = realm.by_number()
+        self._nets = dict(nets)
+        own_ages, ages = _ages(settings)
+        self._tracks = Tracks(member.number, own_ages, ages)
+        self._conditions: dict[int, Condition] = {}
+        self._clocks: dict[int, SenderClock] = {}
+        self._velocity = SmoothVelocity()
+        self._seen: OrderedDict[Key, None] = OrderedDict()
+        self._sequences: Counter[Address] = Counter()
+        self._placed: Report | None = None
+        self._now_ns = self._last_step = self._last_second = 0
+        self._frames: list[OutgoingFrame] = []
+
+    # -- the core's four entrances ----------------------------------------------------------------------------
+
+    def handle(self, envelope: Envelope) -> list[Envelope]:
+        """A message of our own soldier: position, fix, alert, observation, status."""
+        message = envelope.message
+        if envelope.address.soldier != self._member.id:
+            self.counters["foreign_messages"] += 1
+            return []
+        match message:
+            case Position():
+                self._placed = None
+                return self._own_report(self._report_of(message))
+            case Fix():
+                return self._place(message)
+            case Alert() | Observation() | Status():
+                # What we publish of others comes back from the bus under our own subtree.
+                return self._own_notice(message) if message.soldier == self._member.id else []
+            case _:
+                self.counters["foreign_messages"] += 1
+                return []
+
+    def receive(self, link: str, datagram: bytes, now_ns: int) -> list[Envelope]:
+        """A datagram from a link, arrived at ``now_ns`` of event time; anything may be in it."""
+        self._now_ns = max(self._now_ns, now_ns)
+        heard = self._nets[link].hear(datagram, self._now_ns, self._roster, exercise=self._settings.exercise)
+        if heard is None:
+            return []
+        sender, content = heard
+        if isinstance(content, Reports):
+            return self._heard_reports(sender, content.reports, link)
+        return self._heard_notice(content, link)
+
+    def tick(self, now_ns: int) -> list[Envelope]:
+        """Event time is ``now_ns``: tracks age, nets speak, links report."""
+        self._now_ns = max(self._now_ns, now_ns)
+        outputs = [self._track(known) for known in self._tracks.changes(self._now_ns)]
+        if self._now_ns // STEP_NS > self._last_step:
+            self._last_step = self._now_ns // STEP_NS
+            self._speak()
+        if self._now_ns // NS_PER_S > self._last_second:
+            self._last_second = self._now_ns // NS_PER_S
+            outputs += self._each_second()
+        return outputs
+
+    def take_frames(self) -> list[OutgoingFrame]:
+        """The frames to send since the last call, in order."""
+        frames, self._frames = self._frames, []
+        return frames
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """The names of the hub's radio nets."""
+        return tuple(self._nets)
+
+    def memory(self, link: str) -> Memory:
+        """What was heard on a link, for keeping over a restart."""
+        return self._nets[link].opener.memory
+
+    def frames_heard(self, link: str) -> int:
+        """How many authentic frames came over a link, each once."""
+        return self._nets[link].opener.opened
+
+    def figures(self) -> Figures:
+        """Counts of what was refused and why, over all links, and how many tracks are in which state."""
+        counters = Counter(self.counters)
+        for net in self._nets.values():
+            counters.update({f"radio_{cause}": count for cause, count in net.meter.rejected.items()})
+            counters["notices_dropped"] += net.outbox.dropped
+            counters["radio_counter_faults"] += net.counter_faults
+        states = Counter(known.state for known in self._tracks.all())
+        gauges = {f"tracks_{state}": float(states[state]) for state in ("fresh", "stale", "lost")}
+        silent = counters["radio_counter_faults"] > 0
+        return Figures(
+            state="degraded" if silent else "ok",
+            counters=dict(counters),
+            gauges=gauges,
+            note="no fresh radio counters can be reserved: not sending" if silent else "",
+        )
+
+    # -- our own soldier --------------------------------------------------------------------------------------
+
+    @property
+    def _condition(self) -> Condition:
+        return self._conditions.get(self._member.number, "ok")
+
+    def _report_of(self, position: Position) -> Report:
+        east, north, _ = position.velocity_m_s
+        velocity = self._velocity.update(position.time_ns, east, north)
+        return report_of_position(position, self._member.number, velocity, self._condition)
+
+    def _place(self, fix: Fix) -> list[Envelope]:
+        """A command post stands where a person put it; a soldier's fix is for the fusion to go on from."""
+        if self._settings.role != "command_post":
+            return []
+        self._placed = report_of_fix(fix, self._member.number, self._condition)
+        return self._own_report(self._placed)
+
+    def _own_report(self, report: Report) -> list[Envelope]:
+        received_ns = max(self._now_ns, report.time_ns)
+        known = self._tracks.update(report, received_ns, "own")
+        if known is None:
+            self.counters["positions_out_of_order"] += 1
+            return []
+        return [self._track(known)]
+
+    def _own_notice(self, message: Alert | Observation | Status) -> list[Envelope]:
+        notice = notice_of(message, self._member.number)
+        if isinstance(notice, StatusNotice):
+            self._conditions[notice.number] = notice.condition
+        if self._is_new(notice):
+            for net in self._nets.values():
+                net.post(notice, self._now_ns)
+        return []
+
+    # -- what was heard ---------------------------------------------------------------------------------------
+
+    def _heard_reports(self, sender: int, reports: Sequence[Report], link: str) -> list[Envelope]:
+        clock = self._clocks.setdefault(sender, SenderClock())
+        for report in reports:
+            if report.number == sender and report.hops == 0:
+                clock.observe(report.time_ns, self._now_ns)
+        outputs: list[Envelope] = []
+        for report in reports:
+            outputs += self._heard_report(replace(report, time_ns=report.time_ns + clock.offset_ns), link)
+        return outputs
+
+    def _heard_report(self, report: Report, link: str) -> list[Envelope]:
+        if report.number not in self._roster:
+            self.counters["unknown_soldiers"] += 1
+            return []
+        self._nets[link].scheduler.told(report)
+        if report.number == self._member.number:
+            return []
+        known = self._tracks.update(report, self._now_ns, link)
+        if known is None:
+            self.counters["reports_not_newer"] += 1
+            return []
+        return [self._track(known), *self._condition_change(report)]
+
+    def _condition_change(self, report: Report) -> Iterable[Envelope]:
+        """A report tells a condition, too; the bus hears of it when it has changed."""
+        if report.condition == self._conditions.get(report.number, "ok"):
+            return
+        self._conditions[report.number] = report.condition
+        yield self._notice(StatusNotice(report.number, report.time_ns, report.condition))
+
+    def _heard_notice(self, notice: Notice, link: str) -> list[Envelope]:
+        if notice.number not in self._roster:
+            self.counters["unknown_soldiers"] += 1
+            return []
+        if notice.number == self._member.number or not self._is_new(notice):
+            return []
+        if isinstance(notice, StatusNotice):
+            self._conditions[notice.number] = notice.condition
+        if self._settings.relays and notice.hops < MAX_HOPS:
+            for name, net in self._nets.items():
+                if name != link:
+                    net.post(one_hop_on(notice), self._now_ns)
+        return [self._notice(notice)]
+
+    def _is_new(self, notice: Notice) -> bool:
+        """Whether this event was not seen before; repeats and copies over other ways are not new."""
+        key = key_of(notice)
+        if key in self._seen:
+            return False
+        self._seen[key] = None
+        if len(self._seen) > _REMEMBERED_NOTICES:
+            self._seen.popitem(last=False)
+        return True
+
+    # -- what is told -----------------------------------------------------------------------------------------
+
+    def _speak(self) -> None:
+        candidates = self._candidates()
+        for name, net in self._nets.items():
+            frames = net.speak(candidates, self._now_ns)
+            self._frames += [OutgoingFrame(name, data) for data in frames]
+
+    def _candidates(self) -> list[Report]:
+        """Our own report and, from a relay, everyone's that is not lost and may pass another relay."""
+        candidates: list[Report] = []
+        for known in self._tracks.all():
+            if known.state == "lost":
+                continue
+            if known.report.number == self._member.number:
+                candidates.append(known.report)
+            elif self._settings.relays and known.report.hops < MAX_HOPS:
+                candidates.append(one_hop_on(known.report))
+        return candidates
+
+    def _each_second(self) -> Iterable[Envelope]:
+        """Link reports, and a command post that still stands where it was put."""
+        if self._placed is not None:
+            yield from self._own_report(replace(self._placed, time_ns=self._now_ns))
+        for name, net in self._nets.items():
+            yield self._envelope(name, net.report(self._now_ns))
+
+    def _track(self, known: Known) -> Envelope:
+        member = self._roster[known.report.number]
+        return self._envelope(member.id, track_of(known, member))
+
+    def _notice(self, notice: Notice) -> Envelope:
+        soldier = self._roster[notice.number].id
+        return self._envelope(soldier, message_of(notice, soldier))
+
+    def _envelope(self, source: str, message: Message) -> Envelope:
+        """A message under our own subtree, numbered per subject and source."""
+        address = self._identity.address(SUBJECT_OF[type(message)], source)
+        sequence = self._sequences[address]
+        self._sequences[address] += 1
+        return Envelope(address, msgspec.structs.replace(message, sequence=sequence))
+
+
+def _ages(settings: HubSettings) -> tuple[Ages, Ages]:
+    lost_ns = round(settings.lost_s * NS_PER_S)
+    own = Ages(round(settings.own_stale_s * NS_PER_S), lost_ns)
+    return own, Ages(round(settings.stale_s * NS_PER_S), lost_ns)

@@ -1,0 +1,154 @@
+"""The sa-hub process: sockets, key and counter files around the hub's core."""
+
+import math
+import time
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from bootprint.bus import Envelope
+from bootprint.clock import EventClock
+from bootprint.messages import Track
+from bootprint.service import Context, Figures, Service
+from sa_hub.assembly import build_hub
+from sa_hub.hub import HubCore
+from sa_hub.keys import load_group_key
+from sa_hub.radio.counters import FileCounters
+from sa_hub.radio.links.udp import UdpLink
+from sa_hub.radio.replay import Memory
+from sa_hub.radio.replay_file import load_memory, save_memory
+from sa_hub.settings import HubSettings, check_settings
+
+_LATENCIES: Final = 512
+
+
+class LatencyGauge:
+    """Host time from the event time of our own positions to the publication of their tracks."""
+
+    def __init__(self, clock: EventClock) -> None:
+        self._clock = clock
+        self._seconds: deque[float] = deque(maxlen=_LATENCIES)
+
+    def observe(self, outputs: Iterable[Envelope]) -> None:
+        """Note the tracks of our own soldier among these outputs."""
+        for envelope in outputs:
+            if isinstance(envelope.message, Track) and envelope.message.via == "own":
+                latency_s = self._clock.host_seconds_since(envelope.message.time_ns)
+                if latency_s is not None:
+                    self._seconds.append(latency_s)
+
+    def gauges(self) -> dict[str, float]:
+        """``latency_p99_ms``, if there is anything to tell."""
+        if not self._seconds:
+            return {}
+        ordered = sorted(self._seconds)
+        return {"latency_p99_ms": 1e3 * ordered[math.ceil(0.99 * len(ordered)) - 1]}
+
+
+class HubPart:
+    """A hub's core with its sockets; replay memory is written before what a frame said is published."""
+
+    def __init__(self, context: Context, core: HubCore, settings: HubSettings, radio_dir: Path) -> None:
+        self._context = context
+        self._core = core
+        self._latency = LatencyGauge(context.clock)
+        self._radio_dir = radio_dir
+        self._memory_faults = 0
+        self._links = {link.name: UdpLink(link, partial(self._arrived, link.name)) for link in settings.links}
+
+    def start(self) -> None:
+        """Begin to receive."""
+        for link in self._links.values():
+            link.start()
+
+    def _arrived(self, name: str, data: bytes) -> None:
+        """In the link's thread: hand the datagram to the main loop."""
+        self._context.post(lambda: self._receive(name, data))
+
+    def _receive(self, name: str, data: bytes) -> list[Envelope]:
+        heard_before = self._core.frames_heard(name)
+        outputs = self._core.receive(name, data, self._context.clock.now_ns())
+        if self._core.frames_heard(name) != heard_before:
+            self._save_memory(name)
+        return outputs
+
+    def _save_memory(self, name: str) -> None:
+        try:
+            save_memory(_memory_path(self._radio_dir, name), self._core.memory(name))
+        except OSError:
+            self._memory_faults += 1
+
+    def handle(self, envelope: Envelope) -> list[Envelope]:
+        """A message of our own soldier."""
+        outputs = self._core.handle(envelope)
+        self._latency.observe(outputs)
+        return outputs
+
+    def tick(self, now_ns: int) -> list[Envelope]:
+        """Event time goes on; what the nets have to say goes out."""
+        outputs = self._core.tick(now_ns)
+        for frame in self._core.take_frames():
+            self._links[frame.link].send(frame.data)
+        return outputs
+
+    def figures(self) -> Figures:
+        """The core's figures, the sockets' faults and the latency."""
+        figures = self._core.figures()
+        faults = {
+            "send_faults": sum(link.send_faults for link in self._links.values()),
+            "memory_faults": self._memory_faults,
+        }
+        return replace(
+            figures, counters=figures.counters | faults, gauges=figures.gauges | self._latency.gauges()
+        )
+
+    def close(self) -> Iterable[Envelope]:
+        """Close the sockets."""
+        for link in self._links.values():
+            link.close()
+        return ()
+
+
+def build(context: Context) -> HubPart:
+    """Read key, counters and replay memory, and bind the sockets; ConfigError if anything is not there or wrong."""
+    computer = context.computer
+    settings = computer.section("hub", HubSettings)
+    check_settings(settings, f"{computer.path}: [hub]")
+    key = load_group_key(computer.keys_dir / f"{settings.group_key or computer.realm.group_key}.key")
+    radio_dir = computer.state_dir / "radio"
+
+    def memory(net: str) -> Memory:
+        loaded, sound = load_memory(_memory_path(radio_dir, net))
+        if not sound:
+            context.log.warning("replay memory is damaged, starting afresh", net=net)
+        return loaded
+
+    core = build_hub(
+        computer.realm,
+        computer.member,
+        settings,
+        key,
+        counters=lambda net: FileCounters(radio_dir / f"{net}.counters", time.time),
+        memories=memory,
+    )
+    return HubPart(context, core, settings, radio_dir)
+
+
+def _memory_path(radio_dir: Path, net: str) -> Path:
+    return radio_dir / f"{net}.heard"
+
+
+SERVICE = Service(
+    name="sa-hub",
+    summary="Keep the squad's picture: tracks, alerts and the radio that carries them.",
+    subjects=("position", "fix", "alert", "observation", "status"),
+    build=build,
+)
+
+
+def main() -> None:
+    """The console script."""
+    SERVICE.main()

@@ -1,0 +1,127 @@
+"""The hub's picture: the newest report of every soldier, and whether it is fresh, stale or lost by now."""
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from bootprint.clock import NS_PER_S
+from bootprint.messages import TrackState
+from sa_hub.radio.content import Report
+
+CLOCK_TOLERANCE_NS: Final = 10 * NS_PER_S
+"""A sender's clock that seems off by less is taken as right: the way of a frame takes time, too."""
+CLOCK_SET_BACK_NS: Final = 60 * NS_PER_S
+"""Our own positions going back by more than this mean that a clock was set right, not that one came late."""
+_CLOCK_SAMPLES: Final = 8
+_SMOOTHING_S: Final = 1.5
+
+
+@dataclass(slots=True)
+class Known:
+    """One soldier as known here. Times are this hub's; ``via`` is the net it came over, "own" for ourselves."""
+
+    report: Report
+    received_ns: int
+    via: str
+    state: TrackState = "fresh"
+
+
+@dataclass(frozen=True, slots=True)
+class Ages:
+    """From which age a track is stale, and lost."""
+
+    stale_ns: int
+    lost_ns: int
+
+    def state(self, age_ns: int) -> TrackState:
+        """The state of a track of this age."""
+        if age_ns >= self.lost_ns:
+            return "lost"
+        return "stale" if age_ns >= self.stale_ns else "fresh"
+
+
+class Tracks:
+    """The newest report of each soldier. Our own track ages by its arrival, others by their report's time."""
+
+    def __init__(self, own: int, own_ages: Ages, ages: Ages) -> None:
+        self._own = own
+        self._own_ages = own_ages
+        self._ages = ages
+        self._known: dict[int, Known] = {}
+
+    def update(self, report: Report, received_ns: int, via: str) -> Known | None:
+        """Take a report in; None if the one known is as new."""
+        known = self._known.get(report.number)
+        if known is not None and not self._supersedes(report, known.report):
+            return None
+        fresh = Known(report, received_ns, via)
+        fresh.state = self._state(fresh, received_ns)
+        self._known[report.number] = fresh
+        return fresh
+
+    def get(self, number: int) -> Known | None:
+        """What is known of a soldier."""
+        return self._known.get(number)
+
+    def all(self) -> list[Known]:
+        """Everyone known, by number."""
+        return [self._known[number] for number in sorted(self._known)]
+
+    def changes(self, now_ns: int) -> Iterator[Known]:
+        """Those whose state has changed by ``now_ns``; their new state is set."""
+        for known in self.all():
+            state = self._state(known, now_ns)
+            if state != known.state:
+                known.state = state
+                yield known
+
+    def _supersedes(self, report: Report, known: Report) -> bool:
+        set_back = report.number == self._own and known.time_ns - report.time_ns > CLOCK_SET_BACK_NS
+        return report.time_ns > known.time_ns or set_back
+
+    def _state(self, known: Known, now_ns: int) -> TrackState:
+        if known.report.number == self._own:
+            return self._own_ages.state(now_ns - known.received_ns)
+        return self._ages.state(now_ns - known.report.time_ns)
+
+
+class SenderClock:
+    """How far a sender's clock is behind ours, from the times its frames tell of the sender itself.
+
+    The smallest of the last differences (arrival − report), for a frame's way only adds to it; within ten seconds
+    the sender's clock is taken as right.
+    """
+
+    def __init__(self) -> None:
+        self._differences_ns: deque[int] = deque(maxlen=_CLOCK_SAMPLES)
+
+    def observe(self, reported_ns: int, arrived_ns: int) -> None:
+        """A sender's report of itself has arrived."""
+        self._differences_ns.append(arrived_ns - reported_ns)
+
+    @property
+    def offset_ns(self) -> int:
+        """What to add to the sender's times to have ours."""
+        if not self._differences_ns:
+            return 0
+        least = min(self._differences_ns)
+        return 0 if abs(least) <= CLOCK_TOLERANCE_NS else least
+
+
+class SmoothVelocity:
+    """First-order low-pass (1.5 s) of velocity: a report's velocity must outlast the sway of a stride."""
+
+    def __init__(self) -> None:
+        self._velocity = (0.0, 0.0)
+        self._time_ns: int | None = None
+
+    def update(self, time_ns: int, east_m_s: float, north_m_s: float) -> tuple[float, float]:
+        """The smoothed (east, north) velocity; afresh after ten time constants or when time goes back."""
+        elapsed_s = math.inf if self._time_ns is None else (time_ns - self._time_ns) / NS_PER_S
+        gain = -math.expm1(-elapsed_s / _SMOOTHING_S) if 0.0 <= elapsed_s < 10 * _SMOOTHING_S else 1.0
+        east, north = self._velocity
+        self._velocity = (east + gain * (east_m_s - east), north + gain * (north_m_s - north))
+        self._time_ns = time_ns
+        return self._velocity

@@ -1,0 +1,1 @@
+"""Bytes in, readings out: pure, one module a protocol. Every oddity of a protocol ends here."""

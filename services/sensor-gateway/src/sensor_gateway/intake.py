@@ -1,0 +1,162 @@
+"""One device's stream of bytes made into messages: decoded, stamped in UTC, checked, batched, numbered. Pure."""
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
+
+from bootprint.bus import Envelope
+from bootprint.messages import ImuBatch
+from bootprint.topics import BY_SUBJECT, SUBJECT_OF, Identity
+from sensor_gateway.batching import ImuBatcher, Samples, mags
+from sensor_gateway.clock import DeviceClock
+from sensor_gateway.decoders.gnss import GnssDecoder
+from sensor_gateway.decoders.mavlink import MavlinkDecoder
+from sensor_gateway.rates import RateMeter
+from sensor_gateway.readings import ClockId, Decoder, ImuReading, MessageReading, Reading, TimeReading
+from sensor_gateway.settings import Device
+from sensor_gateway.stamps import restamped
+
+# A source is silent when it misses three messages, and a second more.
+_SILENT_MESSAGES, _SILENT_S = 3.0, 1.0
+
+
+def make_decoder(device: Device) -> Decoder:
+    """The decoder of a device's protocol."""
+    return MavlinkDecoder(device) if device.protocol == "mavlink" else GnssDecoder(device)
+
+
+class Intake:
+    """The messages of one device. What is not finite, out of range, repeated or late is dropped and counted."""
+
+    def __init__(self, identity: Identity, device: Device) -> None:
+        self._identity = identity
+        self._device = device
+        self._decoder = make_decoder(device)
+        self._counts: Counter[str] = Counter()
+        self._clocks: defaultdict[ClockId, DeviceClock] = defaultdict(DeviceClock)
+        self._batchers: dict[str, ImuBatcher] = {}
+        self._newest_ns: dict[tuple[str, str], int] = {}
+        self._sequences: Counter[tuple[str, str]] = Counter()
+        self._heard_ns: dict[tuple[str, str], int] = {}
+        self._rates = RateMeter()
+
+    def feed(self, data: bytes, received_ns: int) -> list[Envelope]:
+        """Take bytes that the host received at this UTC time."""
+        return self._messages(self._decoder.feed(data, received_ns), received_ns)
+
+    def cut(self, received_ns: int) -> list[Envelope]:
+        """The stream was cut (unplugged, or the end): drop the half message, give out all that is whole."""
+        return [*self._messages(self._decoder.cut(received_ns), received_ns), *self._flush()]
+
+    def tick(self, now_ns: int) -> list[Envelope]:
+        """A batch whose sensor fell silent does not wait for its next sample."""
+        due = [place for place, batcher in self._batchers.items() if batcher.is_due(now_ns)]
+        return [self._batch(place, self._batchers[place].take()) for place in due]
+
+    def counters(self) -> dict[str, int]:
+        """Counts since the start."""
+        clocks = self._clocks.values()
+        return {
+            **(self._decoder.counts + self._counts),
+            "clock_resets": sum(clock.resets for clock in clocks),
+            "clock_steps": sum(clock.steps for clock in clocks),
+        }
+
+    def gauges(self) -> dict[str, float]:
+        """Rates since the last call, and how far applied clock offsets are from the best known."""
+        behind_ns = max((abs(clock.behind_ns) for clock in self._clocks.values()), default=0)
+        return {**self._rates.take(), "clock_behind_ms": behind_ns / 1e6}
+
+    def silent(self, now_ns: int, opened_ns: int) -> list[str]:
+        """The sensors from which nothing has come for too long."""
+        return [
+            f"{subject}/{source} is silent"
+            for subject, source in self._device.expected()
+            if now_ns - self._heard_ns.get((subject, source), opened_ns) > _silence_ns(subject)
+        ]
+
+    def notes(self) -> list[str]:
+        """What else a person should know."""
+        return self._decoder.notes()
+
+    def _messages(self, readings: Iterable[Reading], received_ns: int) -> list[Envelope]:
+        return [envelope for reading in readings for envelope in self._take(reading, received_ns)]
+
+    def _take(self, reading: Reading, received_ns: int) -> Iterator[Envelope]:
+        if isinstance(reading, TimeReading):
+            self._take_time(reading, received_ns)
+        elif isinstance(reading, ImuReading):
+            yield from self._take_sample(reading, received_ns)
+        else:
+            yield from self._take_message(reading, received_ns)
+
+    def _take_time(self, reading: TimeReading, received_ns: int) -> None:
+        clock = self._clocks[reading.clock]
+        clock.observe(reading.device_ns, received_ns)
+        if reading.utc_ns is not None:
+            clock.state_utc(reading.device_ns, reading.utc_ns)
+
+    def _take_sample(self, reading: ImuReading, received_ns: int) -> Iterator[Envelope]:
+        if not all(map(math.isfinite, (*reading.accel_m_s2, *reading.gyro_rad_s))):
+            self._counts["not_finite"] += 1
+            return
+        utc_ns = self._clocks[reading.clock].utc_ns(reading.device_ns, received_ns)
+        if not self._advances("imu", reading.place, utc_ns, received_ns):
+            return
+        batcher = self._batchers.get(reading.place)
+        if batcher is None:
+            batcher = ImuBatcher(self._device.batch_size, self._device.batch_age_ns)
+            self._batchers[reading.place] = batcher
+        for samples in batcher.add(utc_ns, reading):
+            yield self._batch(reading.place, samples)
+
+    def _take_message(self, reading: MessageReading, received_ns: int) -> Iterator[Envelope]:
+        message, source = reading.message, reading.source
+        subject = SUBJECT_OF[type(message)]
+        shift_ns = 0
+        if reading.clock is not None:
+            shift_ns = self._clocks[reading.clock].utc_ns(message.time_ns, received_ns) - message.time_ns
+        if not self._advances(subject, source, message.time_ns + shift_ns, received_ns):
+            return
+        try:
+            stamped = restamped(message, shift_ns, self._next_sequence(subject, source))
+        except ValueError:  # a start so far back that it fits no stamp
+            self._counts["messages_invalid"] += 1
+            return
+        yield Envelope(self._identity.address(subject, source), stamped)
+
+    def _advances(self, subject: str, source: str, utc_ns: int, received_ns: int) -> bool:
+        """Whether a stamp is later than all before it from this source."""
+        key = (subject, source)
+        newest_ns = self._newest_ns.get(key)
+        if newest_ns is not None and utc_ns <= newest_ns:
+            self._counts["duplicates" if utc_ns == newest_ns else "stamps_back"] += 1
+            return False
+        self._newest_ns[key] = utc_ns
+        self._heard_ns[key] = received_ns
+        self._rates.count(subject, source, 1, utc_ns)
+        return True
+
+    def _flush(self) -> list[Envelope]:
+        waiting = [(place, batcher.take()) for place, batcher in self._batchers.items()]
+        return [self._batch(place, samples) for place, samples in waiting if samples]
+
+    def _batch(self, place: str, samples: Samples) -> Envelope:
+        batch = ImuBatch.from_arrays(
+            self._next_sequence("imu", place),
+            [utc_ns for utc_ns, _ in samples],
+            [reading.accel_m_s2 for _, reading in samples],
+            [reading.gyro_rad_s for _, reading in samples],
+            mags(samples),
+        )
+        return Envelope(self._identity.address("imu", place), batch)
+
+    def _next_sequence(self, subject: str, source: str) -> int:
+        sequence = self._sequences[subject, source]
+        self._sequences[subject, source] += 1
+        return sequence
+
+
+def _silence_ns(subject: str) -> int:
+    rate_hz = BY_SUBJECT[subject].rate_hz or 1.0
+    return round((_SILENT_S + _SILENT_MESSAGES / rate_hz) * 1e9)

@@ -1,0 +1,22 @@
+"""The console script ``sensor-gateway``."""
+
+from bootprint.service import Context, Part, Service
+
+
+def _build(context: Context) -> Part:
+    from sensor_gateway.gateway import build  # brings pymavlink and scipy; --help must not wait for them
+
+    return build(context)
+
+
+SERVICE = Service(
+    name="sensor-gateway",
+    summary="Reads sensors (serial, UDP) or replays recordings, and publishes typed sensor messages.",
+    subjects=(),
+    build=_build,
+)
+
+
+def main() -> None:
+    """Run the service."""
+    SERVICE.main()

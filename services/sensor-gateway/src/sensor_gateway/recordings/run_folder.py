@@ -1,0 +1,149 @@
+"""Run folders: bring your own data. CSV files with fixed names and headers, and an optional strict ``run.toml``.
+
+Any of ``left_foot.csv right_foot.csv body.csv`` (``time_s,ax,ay,az,gx,gy,gz[,mx,my,mz]``: s, m/s², rad/s, µT,
+sensor axes as mounted), ``pressure.csv``, ``gnss.csv``, ``camera_motion.csv`` and ``truth.csv``
+(``time_s,east_m,north_m[,up_m]``; way-points are enough). An empty cell is unknown.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import numpy as np
+
+from bootprint.config import Config, Origin, load_toml
+from bootprint.errors import RecordingError
+from sensor_gateway.recordings.run import (
+    CameraSeries,
+    GnssSeries,
+    ImuSeries,
+    Kind,
+    PressureSeries,
+    Run,
+    Truth,
+)
+from sensor_gateway.recordings.tables import Table, imu_series, peek_header, read_table
+
+PLACES = ("left_foot", "right_foot", "body")
+_IMU = ("time_s", "ax", "ay", "az", "gx", "gy", "gz")
+_MAG = ("mx", "my", "mz")
+_GNSS = ("lat_deg", "lon_deg", "alt_m", "h_acc_m", "v_acc_m", "satellites", "speed_m_s", "course_deg")
+_OPTIONAL_SENSORS = ("pressure", "gnss", "camera_motion")
+_HEADERS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    **dict.fromkeys(PLACES, (_IMU, _MAG)),
+    "pressure": (("time_s", "pressure_pa"), ()),
+    "gnss": (("time_s", "lat_deg", "lon_deg"), _GNSS[2:]),
+    "camera_motion": (("start_time_s", "time_s", "tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad"), ()),
+    "truth": (("time_s", "east_m", "north_m"), ("up_m",)),
+}
+
+
+class RunNotes(Config, frozen=True):
+    """``run.toml``: what the tables do not tell. ``sensors`` names those to use (default: all that are there)."""
+
+    kind: Kind | None = None
+    sensors: Annotated[tuple[str, ...], msgspec.Meta(min_length=1)] | None = None
+    origin: Origin | tuple[float, float, float] | None = None
+    licence: str = ""
+
+
+def recognises_folder(folder: Path) -> bool:
+    """A folder with at least one sensor file of the right name that begins like one."""
+    return any(_looks_like(folder / f"{name}.csv") for name in (*PLACES, *_OPTIONAL_SENSORS))
+
+
+def _looks_like(path: Path) -> bool:
+    header = peek_header(path) if path.is_file() else ()
+    return bool(header) and header[0][0] in ("time_s", "start_time_s")
+
+
+def read_folder(folder: Path) -> list[Run]:
+    """The folder's one run; RecordingError or ConfigError on anything wrong in it."""
+    notes = load_toml(folder / "run.toml", RunNotes) if (folder / "run.toml").exists() else RunNotes()
+    tables = {name: _read(folder / f"{name}.csv", name) for name in _sensors(folder, notes)}
+    imus = {place: _imu(tables[place]) for place in PLACES if place in tables}
+    truth = folder / "truth.csv"
+    return [
+        Run(
+            name=folder.resolve().name,
+            kind=notes.kind or _kind(set(imus), "camera_motion" in tables),
+            path=folder,
+            imus=imus,
+            truth={"body": _truth(_read(truth, "truth"))} if truth.exists() else {},
+            pressure=_pressure(tables["pressure"]) if "pressure" in tables else None,
+            gnss=_gnss(tables["gnss"]) if "gnss" in tables else None,
+            camera=_camera(tables["camera_motion"]) if "camera_motion" in tables else None,
+            origin=_origin(notes),
+            source=notes.licence,
+        )
+    ]
+
+
+def _sensors(folder: Path, notes: RunNotes) -> list[str]:
+    """The sensors to read: those named, which must be there, or all that are there."""
+    known = (*PLACES, *_OPTIONAL_SENSORS)
+    there = [name for name in known if (folder / f"{name}.csv").exists()]
+    if notes.sensors is None:
+        return there
+    for name in notes.sensors:
+        if name not in known:
+            raise RecordingError(
+                f"{folder / 'run.toml'}: unknown sensor {name!r} (known: {', '.join(known)})"
+            )
+        if name not in there:
+            raise RecordingError(f"{folder / 'run.toml'}: sensor {name!r} has no file {name}.csv beside it")
+    return list(notes.sensors)
+
+
+def _read(path: Path, name: str) -> Table:
+    """A table whose columns are all wanted and all known."""
+    table = read_table(path)
+    wanted, optional = _HEADERS[name]
+    table.columns(*wanted)
+    unknown = set(table.header[-1]) - {*wanted, *optional}
+    if unknown:
+        raise RecordingError(
+            f"{path}: unknown column {sorted(unknown)[0]!r} (known: {', '.join(wanted + optional)})"
+        )
+    return table
+
+
+def _kind(places: set[str], has_camera: bool) -> Kind:
+    if {"left_foot", "right_foot"} <= places:
+        return "dual"
+    if places & {"left_foot", "right_foot"}:
+        return "foot"
+    return "body" if places or not has_camera else "camera"
+
+
+def _imu(table: Table) -> ImuSeries:
+    data = table.columns(*_IMU)
+    mag = table.columns(*_MAG) if _MAG[0] in table.header[-1] else None
+    return imu_series(table.path, data[:, 0], data[:, 1:4], data[:, 4:7], mag)
+
+
+def _truth(table: Table) -> Truth:
+    time_s, track = table.column("time_s"), table.columns("east_m", "north_m")
+    if not np.isfinite(track).all() or not (np.diff(time_s) > 0.0).all():
+        raise RecordingError(f"{table.path}: truth must be finite and its time_s must rise")
+    return Truth(time_s, np.column_stack([track, table.optional("up_m")]))
+
+
+def _pressure(table: Table) -> PressureSeries:
+    return PressureSeries(table.column("time_s"), table.column("pressure_pa"))
+
+
+def _gnss(table: Table) -> GnssSeries:
+    return GnssSeries(table.column("time_s"), *(table.optional(name)[:, 0] for name in _GNSS))
+
+
+def _camera(table: Table) -> CameraSeries:
+    translation = table.columns("tx_m", "ty_m", "tz_m")
+    rotation = table.columns("rx_rad", "ry_rad", "rz_rad")
+    return CameraSeries(table.column("start_time_s"), table.column("time_s"), translation, rotation)
+
+
+def _origin(notes: RunNotes) -> tuple[float, float, float] | None:
+    if isinstance(notes.origin, Origin):
+        return notes.origin.latitude_deg, notes.origin.longitude_deg, notes.origin.height_m
+    return notes.origin

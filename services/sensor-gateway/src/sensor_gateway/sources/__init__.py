@@ -1,0 +1,1 @@
+"""Where bytes and recorded messages come from: serial ports, UDP sockets, replay."""

@@ -1,0 +1,105 @@
+"""UDP links over real loopback sockets: unicast, multicast, and addresses that cannot be used."""
+
+import queue
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from bootprint.errors import ConfigError
+from sa_hub.radio.links.udp import UdpLink
+from sa_hub.settings import LinkProfile
+
+GROUP = "239.255.77.7"
+
+
+def profile(name: str = "squad", **options: object) -> LinkProfile:
+    return LinkProfile(name=name, rate_bits_per_s=1200, **options)  # type: ignore[arg-type]
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@pytest.fixture
+def opened() -> Iterator[Callable[[LinkProfile], tuple[UdpLink, "queue.Queue[bytes]"]]]:
+    """Makes running links that are closed in the end."""
+    with ExitStack() as stack:
+
+        def make(link_profile: LinkProfile) -> tuple[UdpLink, "queue.Queue[bytes]"]:
+            inbox: queue.Queue[bytes] = queue.Queue()
+            link = UdpLink(link_profile, inbox.put)
+            stack.callback(link.close)
+            link.start()
+            return link, inbox
+
+        yield make
+
+
+Make = Callable[[LinkProfile], tuple[UdpLink, "queue.Queue[bytes]"]]
+
+
+def test_a_datagram_reaches_every_peer_unchanged(opened: Make) -> None:
+    ears = [opened(profile(bind="127.0.0.1:0")) for _ in range(2)]
+    mouth, _ = opened(profile(bind="127.0.0.1:0", peers=tuple(f"localhost:{link.port}" for link, _ in ears)))
+    for data in (b"\x00\xff one", b"", bytes(1400)):
+        mouth.send(data)
+        for _, inbox in ears:
+            assert inbox.get(timeout=5) == data
+    assert mouth.send_faults == 0
+
+
+def test_a_multicast_group_is_heard_by_all_its_members(opened: Make) -> None:
+    port = free_port()
+    options = {"bind": f"{GROUP}:{port}", "peers": (f"{GROUP}:{port}",), "interface": "127.0.0.1"}
+    one, one_hears = opened(profile(**options))
+    _, two_hears = opened(profile(**options))
+    one.send(b"to all")
+    assert two_hears.get(timeout=5) == b"to all"
+    assert one_hears.get(timeout=5) == b"to all"  # its own echo, which the hub knows by its sender
+
+
+def test_a_peer_that_is_not_there_does_no_harm(opened: Make) -> None:
+    ear, inbox = opened(profile(bind="127.0.0.1:0"))
+    mouth, _ = opened(
+        profile(bind="127.0.0.1:0", peers=(f"127.0.0.1:{free_port()}", f"127.0.0.1:{ear.port}"))
+    )
+    for index in range(3):
+        mouth.send(b"%d" % index)
+    assert [inbox.get(timeout=5) for _ in range(3)] == [b"0", b"1", b"2"]
+
+
+def test_what_the_system_refuses_to_send_is_counted(opened: Make) -> None:
+    mouth, _ = opened(profile(bind="127.0.0.1:0", peers=("127.0.0.1:9",)))
+    mouth.send(bytes(70_000))
+    assert mouth.send_faults == 1
+
+
+def test_closing_twice_ends_the_thread() -> None:
+    link = UdpLink(profile(bind="127.0.0.1:0"), lambda data: None)
+    link.start()
+    link.close()
+    link.close()
+    with pytest.raises(OSError, match="descriptor"):
+        _ = link.port
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"bind": "6970"}, "must be host:port"),
+        ({"bind": "127.0.0.1:99999"}, "must be host:port"),
+        ({"peers": ("127.0.0.1",)}, "must be host:port"),
+        ({"peers": ("no.such.host.invalid:1",)}, "is not known"),
+        ({"bind": "192.0.2.1:6970"}, "cannot use 192.0.2.1:6970"),
+    ],
+)
+def test_addresses_that_cannot_be_used_are_refused(options: dict[str, object], message: str) -> None:
+    with pytest.raises(ConfigError, match=message) as caught:
+        UdpLink(profile(**options), lambda data: None)
+    assert "'squad'" in str(caught.value)
+    assert "\n" not in str(caught.value)

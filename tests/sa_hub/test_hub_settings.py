@@ -1,0 +1,109 @@
+"""The hub's configuration and its key: what is wrong is said in one line that tells the mend."""
+
+import stat
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from bootprint.config import convert
+from bootprint.errors import ConfigError
+from sa_hub.commands import register
+from sa_hub.keys import create_group_key, load_group_key
+from sa_hub.settings import HubSettings, check_settings
+
+LINK = {"name": "squad", "rate_bits_per_s": 1200}
+
+
+def settings(**values: object) -> HubSettings:
+    """As from a [hub] section."""
+    converted = convert(values, HubSettings, where="computer.toml: [hub]")
+    check_settings(converted, "computer.toml: [hub]")
+    return converted
+
+
+def test_defaults_fit_together() -> None:
+    assert settings(links=[LINK]).links[0].header_bytes == 28
+    assert not settings().relays
+    assert settings(role="squad_leader").relays
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"role": "general"}, "role is 'general': expected one of"),
+        ({"heartbeats_s": 3.0}, "did you mean 'heartbeat_s'"),
+        ({"links": [{**LINK, "rate": 3}]}, "unknown key 'rate'"),
+        ({"links": [{"name": "squad"}]}, "rate_bits_per_s"),
+        ({"links": [LINK, LINK]}, "stands there twice"),
+        ({"links": [{**LINK, "name": "a/b"}]}, "letters, digits"),
+        ({"links": [{**LINK, "rate_bits_per_s": 10, "header_bytes": 28}]}, "want a higher rate_bits_per_s"),
+        ({"links": [{**LINK, "mtu_bytes": 20}]}, "40"),
+        ({"heartbeat_s": 80.0}, "heartbeat_s < stale_s < lost_s, got 80, 75, 180"),
+        ({"lost_s": 500.0}, "400"),
+        ({"tag_bytes": 6}, "tag_bytes is 6"),
+        ({"threshold_m": 0.0}, "> 0"),
+    ],
+)
+def test_a_wrong_section_is_refused_in_one_line(values: dict[str, object], message: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        settings(**values)
+    assert message in str(caught.value)
+    assert str(caught.value).startswith("computer.toml: [hub]")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_new_key_is_random_and_for_its_owner_only(tmp_path: Path) -> None:
+    paths = [tmp_path / "keys" / name for name in ("one.key", "two.key")]
+    for path in paths:
+        create_group_key(path)
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    one, two = (load_group_key(path) for path in paths)
+    assert len(one) == len(two) == 32
+    assert one != two
+
+
+def test_a_key_is_never_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "group.key"
+    create_group_key(path)
+    before = path.read_bytes()
+    with pytest.raises(ConfigError, match="exists already"):
+        create_group_key(path)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("content", "mode", "message"),
+    [
+        (None, 0o600, "no group key there"),
+        ("00" * 32, 0o640, "chmod 600"),
+        ("00" * 31, 0o600, "a key of 31 bytes, want 64 hexadecimal digits"),
+        ("zz" * 32, 0o600, "not a group key"),
+        ("é" * 32, 0o600, "not a group key"),
+        ("", 0o600, "a key of 0 bytes"),
+    ],
+)
+def test_a_wrong_key_file_is_refused_in_one_line(
+    tmp_path: Path, content: str | None, mode: int, message: str
+) -> None:
+    path = tmp_path / "group.key"
+    if content is not None:
+        path.write_text(content)
+        path.chmod(mode)
+    with pytest.raises(ConfigError) as caught:
+        load_group_key(path)
+    assert message in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_command_makes_a_key_and_does_not_print_it(tmp_path: Path) -> None:
+    app = typer.Typer()
+    app.callback()(lambda: None)
+    register(app)
+    path = tmp_path / "group.key"
+    result = CliRunner().invoke(app, ["keys", "new", str(path)])
+    assert result.exit_code == 0
+    assert load_group_key(path).hex() not in result.output
+    assert isinstance(CliRunner().invoke(app, ["keys", "new", str(path)]).exception, ConfigError)
