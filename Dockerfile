@@ -13,7 +13,7 @@ RUN /opt/bootprint/bin/pip install --no-cache-dir --quiet --constraint constrain
 
 FROM python:3.11-slim-bookworm
 COPY --from=build /opt/bootprint /opt/bootprint
-RUN useradd --system --uid 10001 --create-home bootprint && install -d -o bootprint /var/lib/bootprint
+RUN useradd --system --uid 10001 --create-home bootprint && install -d -o bootprint /var/lib/bootprint /keys
 ENV PATH=/opt/bootprint/bin:$PATH PYTHONUNBUFFERED=1 NUMBA_CACHE_DIR=/var/lib/bootprint/numba
 USER bootprint
 WORKDIR /etc/bootprint

@@ -44,6 +44,9 @@ golden: $(READY) ## write the golden outputs anew (ARGS=--walk: the small record
 figures: $(READY) ## make anew the figures and generated pages of the documents
 	$(BIN)/bootprint topics > docs/topics.md
 
+compose-test: ## build the image, run docker-compose.yml for real (needs a Docker engine)
+	deploy/compose-test
+
 constraints: ## write constraints.txt anew from a fresh environment (newest versions)
 	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new
 	$(VENV)-new/bin/python -m pip install --quiet --upgrade pip hatchling editables

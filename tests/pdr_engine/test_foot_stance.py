@@ -54,7 +54,7 @@ def test_the_fixed_threshold_of_shoe(factor: float, expected: bool) -> None:
 @pytest.mark.parametrize(("factor", "expected"), [(0.9, True), (1.1, False)])
 def test_the_differential_sums_the_force_s_changes(factor: float, expected: bool) -> None:
     moving = still(1.0, noise=0.0)
-    change = factor * 2.5 / 9  # ten samples in 50 ms at 200 Hz: nine changes
+    change = factor * 1.5 / 9  # ten samples in 50 ms at 200 Hz: nine changes
     moving.accel[1::2, 0] += change
     time_s, stance = stance_of("differential", still(1.0, noise=0.0), moving)
     assert stance[(time_s > 1.1)].all() == stance[time_s > 1.1].any() == expected

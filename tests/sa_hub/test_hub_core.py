@@ -196,6 +196,19 @@ def test_tracks_go_stale_and_lost_and_come_back() -> None:
     assert air.tracks["lead", "a2"].state == "fresh"
 
 
+def test_a_lost_track_is_not_relayed() -> None:
+    soldier, leader = hub("a1", SQUAD), hub("lead", SQUAD, COMPANY, role="squad_leader")
+    soldier.handle(position("a1", START_NS, Walk()))
+    soldier.tick(START_NS)
+    soldier.tick(START_NS + S)
+    for frame in soldier.take_frames():
+        leader.receive("squad", frame.data, START_NS + S)
+    for seconds in (300, 310, 600, 610):
+        leader.tick(START_NS + seconds * S)
+    assert leader.figures().gauges["tracks_lost"] == 1.0
+    assert leader.take_frames() == []
+
+
 def test_our_own_track_goes_stale_within_seconds() -> None:
     core = hub("a1", SQUAD)
     core.handle(position("a1", START_NS, Walk()))

@@ -21,7 +21,7 @@ from sa_hub.radio.content import (
 )
 from sa_hub.radio.errors import FrameError
 from sa_hub.radio.frame import Codec
-from sa_hub.radio.layout import Kind
+from sa_hub.radio.layout import SQUAD, Kind, read_fields, write_fields
 from sa_hub.radio.quantise import MODES, age_code, age_ticks
 from sa_hub.radio.squad import partition
 
@@ -285,6 +285,20 @@ def test_damaged_squad_frames_are_frames_or_frame_errors(squad: list[Report], da
             CODEC.decode(kind, 1, candidate, NOW_NS)
         except FrameError:
             continue
+
+
+def test_a_place_beyond_the_pole_is_refused() -> None:
+    at_the_pole = Report(2, NOW_NS, 90.0, 0.0, 1.0)
+    south_of_it = replace(at_the_pole, number=3, latitude_deg=89.999)
+    kind, payload = CODEC.encode(1, Reports((at_the_pole, south_of_it)), 0, ROOMY)
+    values = read_fields(BitReader(payload), SQUAD, {})
+    writer = BitWriter()
+    write_fields(writer, SQUAD, {**values, "far_latitude": values["far_latitude"] + 1})
+    head_bits = sum(field.width(values) for field in SQUAD if field.present(values))
+    rest = int.from_bytes(payload) & ((1 << (8 * len(payload) - head_bits)) - 1)
+    writer.put(rest, 8 * len(payload) - head_bits)
+    with pytest.raises(FrameError, match="beyond the pole"):
+        CODEC.decode(kind, 1, writer.to_bytes(), NOW_NS)
 
 
 def test_time_is_taken_as_the_nearest_to_the_receivers_own() -> None:

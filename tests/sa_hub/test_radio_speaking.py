@@ -214,6 +214,16 @@ def test_no_frame_is_longer_than_the_link_takes_and_the_budget_holds(
             assert total * S <= rate * (end_ns - begin_ns) + max(4000, 2 * rate) * S
 
 
+@pytest.mark.parametrize("header_bytes", [0, 28])
+def test_a_flooded_link_carries_its_rate_header_bytes_included_and_no_more(header_bytes: int) -> None:
+    net, bits = radio_net(1200, header_bytes=header_bytes), 0
+    for tenth in range(2001):
+        now_ns = START_NS + tenth * S // 10
+        net.post(AlertNotice(1, now_ns, "fire", "x" * (tenth % 100)), now_ns)
+        bits += sum(8 * (len(frame) + header_bytes) for frame in net.speak([], now_ns))
+    assert 1200 * 198 < bits <= 1200 * 200
+
+
 def test_while_an_alert_waits_for_its_bits_nothing_else_is_sent() -> None:
     net = radio_net(rate_bits_per_s=300)
     net.speak([], START_NS)

@@ -130,7 +130,7 @@ class FusionCore:
     def _drain(self) -> Iterator[Envelope]:
         """Take in what is in order now; positions as they become due between."""
         for waiting in self._buffer.release():
-            yield from self._due(waiting.time_ns)
+            yield from self._due(waiting.time_ns - self._lookahead_ns)
             self._take(waiting)
         yield from self._due(self._buffer.low_ns - self._lookahead_ns)
 

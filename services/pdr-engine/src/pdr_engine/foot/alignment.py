@@ -29,7 +29,8 @@ QUIET_WINDOW_NS = 100_000_000
 UNREST_BLOCK_NS = 50_000_000
 ROCKING_S = 0.25
 REST_SPEED_M_S = 0.01
-UNKNOWN_SPEED_M_S = 1.5  # sigma of a walking foot's velocity
+WALKING_SPEED_M_S = 1.5  # sigma of where a person goes unseen
+SWING_SPEED_M_S = 3.0  # sigma of a foot's velocity in mid-walk
 UNKNOWN_TURN_RAD_S = 0.5  # sigma of what a person turns unseen
 RING_LIMIT = RING - 256
 
@@ -160,7 +161,7 @@ def _start_covariance(s: Record, p: Record, tilt_sigma: float, speed_sigma: floa
     assign(s.velocity, (0.0, 0.0, 0.0))
     assign(s.lever, (0.0, 0.0, 0.0))
     for axis in range(3):
-        s.P[POSITION + axis, POSITION + axis] = (UNKNOWN_SPEED_M_S * lost_s) ** 2
+        s.P[POSITION + axis, POSITION + axis] = (WALKING_SPEED_M_S * lost_s) ** 2
         s.P[VELOCITY + axis, VELOCITY + axis] = speed_sigma**2
         s.P[LEVER + axis, LEVER + axis] = p.lever_sigma**2
     s.P[ATTITUDE, ATTITUDE] = s.P[ATTITUDE + 1, ATTITUDE + 1] = tilt_sigma**2
@@ -200,7 +201,8 @@ def _align(s: Record, p: Record, first: int, last: int, verified: bool) -> None:
     _keep_heading(s)
     at_rest = verified and s.time_ns[first & MASK] - s.time_ns[s.start & MASK] < QUIET_WINDOW_NS
     tilt_sigma = p.tilt_sigma if verified else p.quiet_tilt_sigma
-    _start_covariance(s, p, tilt_sigma, REST_SPEED_M_S if at_rest else UNKNOWN_SPEED_M_S)
+    _start_covariance(s, p, tilt_sigma, REST_SPEED_M_S if at_rest else SWING_SPEED_M_S)
+    s.last_still_ns = s.calm_since_ns = s.time_ns[s.start & MASK]
     s.aligned = 1
     s.mode = RUNNING
 

@@ -36,7 +36,7 @@ class DetectorSettings(Config, frozen=True):
     ared_threshold: Positive = 3e7
     # C1: the acceleration's total variation in a sliding window (SWS), small for more than ``hold`` in a row.
     differential_window_s: Positive = 0.05
-    differential_sum_m_s2: Positive = 2.5
+    differential_sum_m_s2: Positive = 1.5
     differential_hold_s: NonNegative = 0.02
 
 
@@ -50,7 +50,7 @@ class AlignmentSettings(Config, frozen=True):
     rate_rad_s: Positive = 0.02  # a mean rate above this is a turn, not a bias (four of its sigmas)
     gravity_tolerance_m_s2: Positive = 0.5
     tilt_sigma_rad: Positive = 0.01
-    quiet_tilt_sigma_rad: Positive = 0.1
+    quiet_tilt_sigma_rad: Positive = 0.03  # 0.3 m/s² of motion taken for gravity
     sway_rad: Positive = 0.0015  # a standing foot rocks by this much: a mean over T is a bias ± sway/T
     bias_sigma_rad_s: Positive = 0.005  # before anything is known
     bias_walk_rad_s_sqrt_s: NonNegative = 2e-5

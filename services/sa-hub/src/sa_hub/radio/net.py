@@ -113,7 +113,7 @@ class RadioNet:
     def _payload_limit(self) -> int:
         """Bytes left for a payload in the longest frame that link and bucket can ever let through."""
         by_bucket = self._bucket.depth_bits // 8 - self.profile.header_bytes
-        return min(self.profile.mtu_bytes, by_bucket) 
+        return min(self.profile.mtu_bytes, by_bucket) - FULL_HEADER_BYTES - self._sealer.tag_bytes
 
     def _encode(self, content: Content) -> tuple[Kind, bytes]:
         return self._codec.encode(self._number, content, self._resolution, self._payload_limit())
