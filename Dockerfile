@@ -16,6 +16,7 @@ COPY --from=build /opt/bootprint /opt/bootprint
 RUN useradd --system --uid 10001 --create-home bootprint && install -d -o bootprint /var/lib/bootprint /keys
 ENV PATH=/opt/bootprint/bin:$PATH PYTHONUNBUFFERED=1 NUMBA_CACHE_DIR=/var/lib/bootprint/numba
 USER bootprint
+RUN python -c "from pdr_engine.foot import warm_up; warm_up()"
 WORKDIR /etc/bootprint
 ENTRYPOINT []
 CMD ["bootprint", "--help"]

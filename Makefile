@@ -18,6 +18,7 @@ $(READY): constraints.txt pyproject.toml $(ROOMS:%=%/pyproject.toml)
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade --constraint constraints.txt pip hatchling editables
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-build-isolation --group dev $(ROOMS:%=--editable ./%)
+	$(BIN)/python -c 'from pdr_engine.foot import warm_up; warm_up()' # compile the foot filter once
 	@touch $@
 
 demo: $(READY) ## four soldiers, six computers, one picture; ARGS are passed on

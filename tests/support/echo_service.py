@@ -3,8 +3,9 @@
 from collections.abc import Iterable
 
 from bootprint.bus import Envelope
+from bootprint.figures import Figures
 from bootprint.messages import Pressure
-from bootprint.service import Context, CorePart, Figures, Service
+from bootprint.service import Context, CorePart, Service
 
 
 class EchoCore:

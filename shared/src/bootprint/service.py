@@ -9,7 +9,7 @@ import resource
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Protocol
 
@@ -21,7 +21,8 @@ from bootprint.bus import Core, Envelope
 from bootprint.clock import EventClock, make_clock
 from bootprint.config import Computer, load_computer
 from bootprint.errors import BootprintError, ConfigError
-from bootprint.messages import Health, ServiceState
+from bootprint.figures import Figures
+from bootprint.messages import Health
 from bootprint.stopping import Stop
 from bootprint.topics import Identity
 from bootprint.zenoh_bus import ZenohBus, open_bus
@@ -32,16 +33,6 @@ _HEALTH_S = 1.0
 EXIT_BAD_INPUT = 2
 
 Job = Callable[[], Iterable[Envelope]]
-
-
-@dataclass
-class Figures:
-    """What a service tells of itself once a second: faults and work as counters, rates and ages as gauges."""
-
-    state: ServiceState = "ok"
-    counters: dict[str, int] = field(default_factory=dict)
-    gauges: dict[str, float] = field(default_factory=dict)
-    note: str = ""
 
 
 class Part(Protocol):

@@ -1,5 +1,6 @@
 """How whatever runs for a while ends: Ctrl-C, SIGTERM, a time limit, a parent that is gone; all of them cleanly."""
 
+import os
 import signal
 import sys
 import threading
@@ -43,7 +44,8 @@ class Stop:
         threading.Thread(target=self._read_to_the_end, name="standard input", daemon=True).start()
 
     def _read_to_the_end(self) -> None:
-        while sys.stdin.buffer.read(1024):
+        # Not sys.stdin: a thread inside its buffer when the interpreter ends makes the process abort.
+        while os.read(sys.stdin.fileno(), 1024):
             pass
         self.finish()
 

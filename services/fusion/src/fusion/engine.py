@@ -17,8 +17,8 @@ from collections.abc import Callable, Iterable, Iterator
 from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.config import Origin
+from bootprint.figures import Figures
 from bootprint.messages import Fix, FootPose, FootStep, GnssFix, Message
-from bootprint.service import Figures
 from bootprint.topics import Address, Identity
 from fusion.config import FusionConfig
 from fusion.estimator import Estimator

@@ -4,8 +4,8 @@ from collections import Counter
 from collections.abc import Iterable
 
 from bootprint.bus import Envelope
+from bootprint.figures import Figures
 from bootprint.messages import ImuBatch
-from bootprint.service import Figures
 from bootprint.topics import Identity
 from pdr_engine.boot import NS_PER_S, Boot
 from pdr_engine.config import PdrConfig

@@ -14,8 +14,8 @@ import msgspec
 from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.config import Member, Realm
+from bootprint.figures import Figures
 from bootprint.messages import Alert, Fix, Message, Observation, Position, Status
-from bootprint.service import Figures
 from bootprint.topics import SUBJECT_OF, Address, Identity
 from sa_hub.radio.content import MAX_HOPS, Condition, Notice, Report, Reports, StatusNotice, one_hop_on
 from sa_hub.radio.net import RadioNet

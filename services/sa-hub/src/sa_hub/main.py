@@ -11,8 +11,9 @@ from typing import Final
 
 from bootprint.bus import Envelope
 from bootprint.clock import EventClock
+from bootprint.figures import Figures
 from bootprint.messages import Track
-from bootprint.service import Context, Figures, Service
+from bootprint.service import Context, Service
 from sa_hub.assembly import build_hub
 from sa_hub.hub import HubCore
 from sa_hub.keys import load_group_key

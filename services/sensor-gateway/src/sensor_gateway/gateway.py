@@ -12,7 +12,8 @@ from typing import ParamSpec, Protocol, TypeVar
 
 from bootprint.bus import Envelope
 from bootprint.errors import ConfigError
-from bootprint.service import Context, Figures, Part
+from bootprint.figures import Figures
+from bootprint.service import Context, Part
 from sensor_gateway import settings as config
 from sensor_gateway.intake import Intake
 from sensor_gateway.sources.replay import Replay
