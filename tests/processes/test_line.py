@@ -40,7 +40,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Played]:
     folder = tmp_path_factory.mktemp("line")
     with Stage(exercise, Play(folder, SPEED)) as stage:
         stage.wait_ready(Stop())
-        stage.start_walks()
+        stage.start_walks(Stop())
         wait_until(
             lambda: stage.processes.check() or stage.elapsed_s > run.duration_s + 4.0,
             timeout_s=60.0,

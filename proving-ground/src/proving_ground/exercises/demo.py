@@ -106,7 +106,7 @@ class Runner:
             self.stage.wait_ready(self.stop)
         if self.stop.is_set():
             return
-        self.stage.start_walks()
+        self.stage.start_walks(self.stop)
         console.print(f"{len(self.stage.processes.pids)} processes run, walks begin")
         if self.headless:
             self._lines(console)

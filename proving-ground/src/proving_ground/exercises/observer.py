@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 
 from bootprint.bus import Envelope
 from bootprint.clock import EventClock
-from bootprint.messages import Health, LinkReport, Position, Track
+from bootprint.messages import Health, LinkReport, Mode, Position, Track
 from bootprint.topics import VERSION
 from bootprint.zenoh_bus import ZenohBus, open_bus
 
+_SENSED: tuple[Mode, ...] = ("gnss", "boots", "body", "camera")  # modes with a sensor behind the position
 WATCHED = ("position", "track", "link", "health")
 
 
@@ -67,7 +68,7 @@ class Observer:
         self._newest[track.soldier] = track
         self._heard.tracks.append((self._clock.now_ns(), track))
         latency_s = self._clock.host_seconds_since(track.time_ns)
-        if track.soldier == self.computer and latency_s is not None:
+        if track.soldier == self.computer and track.mode in _SENSED and latency_s is not None:
             self._heard.latency_s.append(latency_s)
 
     def newest_tracks(self) -> dict[str, Track]:

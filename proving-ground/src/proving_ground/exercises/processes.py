@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -67,9 +68,13 @@ class ProcessGroup:
         if lines := self.failed():
             raise ProcessError("; ".join(lines))
 
-    def stop(self) -> None:
-        """End all: close their input, then terminate, then kill; returns when none is left."""
-        processes = [process for _, process in self._running.values()]
+    def stop(self, names: Collection[str] | None = None) -> None:
+        """End all (or those named): close their input, then terminate, then kill; returns when none is left."""
+        ended = [name for name in self._running if names is None or name in names]
+        processes = [self._running[name][1] for name in ended]
+        if names is not None:
+            for name in ended:
+                del self._running[name]
         for process in processes:
             if process.stdin:
                 process.stdin.close()

@@ -18,6 +18,7 @@ _TABLES = (
     ("pictures", "Pictures at the receivers"),
     ("links", "Radio links, link headers included"),
 )
+_UNITS = {"_bits_per_s": "bit/s", "bits_per_s": "bit/s", "_m": "m", "_s": "s", "_pct": "%", "_ms": "ms"}
 _STYLE = """
 body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem}
 body{color:#1b1f23;background:#fff}
@@ -35,7 +36,7 @@ def print_scores(result: Result) -> None:
         rows = result.figures[key]
         table = Table(title=title, title_justify="left")
         for column in rows[0] if rows else ():
-            table.add_column(column, justify="left" if column == next(iter(rows[0])) else "right")
+            table.add_column(_title(column), justify="left" if column == next(iter(rows[0])) else "right")
         for row in rows:
             table.add_row(*(_cell(value) for value in row.values()))
         console.print(table)
@@ -47,6 +48,14 @@ def write_report(folder: Path, exercise: Exercise, result: Result) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "result.json").write_text(json.dumps(result.figures, indent=2) + "\n", encoding="utf-8")
     (folder / "report.html").write_text(_page(exercise, result), encoding="utf-8")
+
+
+def _title(column: str) -> str:
+    """A column's name for people: the unit after its words, which may break between lines."""
+    for suffix, unit in _UNITS.items():
+        if column.endswith(suffix):
+            return f"{column.removesuffix(suffix).replace('_', ' ')} {unit}"
+    return column.replace("_", " ")
 
 
 def _cell(value: Any) -> str:
@@ -71,7 +80,7 @@ def _page(exercise: Exercise, result: Result) -> str:
 def _html_table(rows: list[dict[str, Any]]) -> str:
     if not rows:
         return "<p>None.</p>"
-    head = "".join(f"<th>{html.escape(column)}</th>" for column in rows[0])
+    head = "".join(f"<th>{html.escape(_title(column))}</th>" for column in rows[0])
     body = "".join(
         "<tr>" + "".join(f"<td>{html.escape(_cell(v))}</td>" for v in row.values()) + "</tr>" for row in rows
     )

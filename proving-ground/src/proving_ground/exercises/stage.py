@@ -26,8 +26,9 @@ from proving_ground.exercises.processes import ProcessGroup, ProcessSpec
 
 SQUAD_NET = NetProfile("squad", rate_bits_per_s=9600.0, latency_s=0.05, header_bytes=28, seed=1)
 COMPANY_NET = NetProfile("company", rate_bits_per_s=4800.0, latency_s=0.15, header_bytes=28, seed=2)
+GATEWAY = "sensor-gateway"
 _READY_TIMEOUT_S = 90.0
-_LEAD_S = 3.0  # host seconds for the gateways to start before the walks do
+_LEAD_S = (3.0, 10.0, 40.0)  # host seconds for the gateways to start before the walks do: one try each
 
 
 class StageError(BootprintError):
@@ -152,13 +153,31 @@ class Stage:
             for service in sorted(set(self._services(computer)) - observer.alive())
         ]
 
-    def start_walks(self) -> None:
-        """Start the gateways; all walks begin at ``start_ns`` of event time, a whole second."""
-        ready_ns = self.clock.now_ns() + round(_LEAD_S * self._play.speed * NS_PER_S)
-        self.start_ns = -(-ready_ns // NS_PER_S) * NS_PER_S
-        for soldier in self.exercise.soldiers:
-            write_gateway(self._play.folder, soldier, self._routers[soldier.id], self.start_ns)
-            self._spawn(soldier.id, "sensor-gateway", "gateway.toml")
+    def start_walks(self, stop: Stop) -> None:
+        """Start the gateways; all walks begin at ``start_ns`` of event time, a whole second.
+
+        A gateway that is not there by then would have to hurry after its walk, so on a busy machine they are
+        started again with more time; StageError if even that is not enough.
+        """
+        gateways = [f"{soldier.id}/{GATEWAY}" for soldier in self.exercise.soldiers]
+        for lead_s in _LEAD_S:
+            ready_ns = self.clock.now_ns() + round(lead_s * self.speed * NS_PER_S)
+            self.start_ns = -(-ready_ns // NS_PER_S) * NS_PER_S
+            for soldier in self.exercise.soldiers:
+                write_gateway(self._play.folder, soldier, self._routers[soldier.id], self.start_ns)
+                self._spawn(soldier.id, GATEWAY, "gateway.toml")
+            if self._gateways_in_time(stop) or stop.is_set():
+                return
+            self.processes.stop(gateways)
+        raise StageError(f"the gateways did not start within {_LEAD_S[-1]:g} s: this machine is too busy")
+
+    def _gateways_in_time(self, stop: Stop) -> bool:
+        """Whether all gateways live before the walks begin."""
+        while not all(GATEWAY in self.observers[soldier.id].alive() for soldier in self.exercise.soldiers):
+            self.processes.check()
+            if self.elapsed_s >= 0.0 or stop.wait(0.1):
+                return False
+        return self.elapsed_s < 0.0
 
     @property
     def elapsed_s(self) -> float:
