@@ -52,6 +52,8 @@ def test_whole_numbers_and_lists_are_taken_as_toml_gives_them() -> None:
         ("[fusion]\nfeets = ['left_foot']\n", "did you mean 'feet'"),
         ("[fusion]\nfeet = []\n", "feet"),
         ("[fusion]\nfeet = ['left_foot', 'left_foot']\n", "twice"),
+        ("[fusion]\nfeet = ['left foot']\n", "feet or gnss_sources 'left foot' must be 1 to 64 letters"),
+        ("[fusion]\ngnss_sources = ['gnss', 'a/b']\n", "feet or gnss_sources 'a/b' must be 1 to 64 letters"),
         ("[fusion]\nreorder_window_s = -1.0\n", "reorder_window_s"),
         ("[fusion.gnss]\nuere = 3.0\n", "did you mean 'uere_m'"),
         ("[fusion.start]\neast_m = 1.0\n", "either east_m and north_m, or latitude_deg and longitude_deg"),

@@ -4,6 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bootprint.messages import FootPose
+from fusion.pulse import LivePulse, ReplayPulse
 from fusion.reorder import Arrival, Promise, ReorderBuffer
 
 WINDOW = 300
@@ -25,7 +26,8 @@ def message(time_ns: int, sequence: int = 0) -> FootPose:
 def buffer(
     expected: str = "", drivers: str = "ab", patience: int = 2000, capacity: int = 4096
 ) -> ReorderBuffer:
-    return ReorderBuffer(WINDOW, frozenset(drivers), frozenset(expected), patience, capacity)
+    pulse = LivePulse(frozenset(drivers), WINDOW, patience)
+    return ReorderBuffer(pulse, frozenset(expected), capacity)
 
 
 def released(buffer: ReorderBuffer) -> list[tuple[int, str, int]]:
@@ -160,3 +162,95 @@ def test_size_is_bounded() -> None:
     verdicts = [held.push("a", message(number, number)) for number in range(12)]
     assert verdicts.count(Arrival.OVERFLOW) == 2
     assert len(held) == 10
+
+
+def test_what_would_be_released_last_gives_way_when_there_is_no_room() -> None:
+    held = buffer("", drivers="a", capacity=3)
+    held.push("a", message(0, 0))
+    for number in range(5):
+        held.push("g", message(1000 + number, number))  # waits for the boots, and waits
+    assert held.push("a", message(100, 1)) is Arrival.QUEUED
+    assert held.evicted == 1
+    held.push("a", message(500, 2))
+    assert released(held) == [(0, "a", 0), (100, "a", 1)]
+
+
+def test_a_receiver_far_ahead_of_boots_and_host_is_refused_however_often_it_says_so() -> None:
+    held = buffer("", drivers="a", patience=2 * S)
+    for second in range(1, 60):
+        assert held.push("a", message(second * S, second)) is Arrival.QUEUED
+        held.advance(second * S)
+        assert held.push("g", message((second + 3600) * S, second)) is Arrival.IMPLAUSIBLE
+    assert held.low_ns == 59 * S - WINDOW
+    assert {source for _, source, _ in released(held)} == {"a"}
+    assert len(held) == 1
+
+
+def test_silence_is_measured_on_each_clock_by_itself() -> None:
+    """A receiver five seconds ahead does not overrule boots that speak; once they are silent it counts seconds."""
+    held = buffer("", drivers="a", patience=2 * S)
+    for second in range(10):
+        held.push("a", message(second * S, second))
+        held.push("g", message((second + 5) * S, second))
+        assert held.low_ns == second * S - WINDOW
+    for second in range(10, 13):
+        held.push("g", message((second + 5) * S, second))
+    assert held.low_ns == 9 * S + 3 * S - 2 * S
+
+
+def test_boots_that_leap_ahead_are_followed_once_they_insist_and_nothing_is_lost() -> None:
+    held = buffer("a", drivers="a")
+    for second in range(5):
+        held.push("a", message(second * S, second))
+    verdicts = [held.push("a", message((100 + second) * S, 5 + second)) for second in range(30)]
+    assert verdicts == [Arrival.IMPLAUSIBLE] * 24 + [Arrival.QUEUED] * 6
+    held.flush()
+    assert [sequence for _, _, sequence in released(held)] == list(range(35))
+
+
+def test_boots_that_leap_ahead_with_the_host_are_followed_at_once() -> None:
+    held = buffer("", drivers="a", patience=2 * S)
+    held.advance(0)
+    held.push("a", message(0, 0))
+    held.advance(3600 * S)
+    assert held.push("a", message(3600 * S, 1)) is Arrival.QUEUED
+    assert held.low_ns == 3600 * S - WINDOW
+
+
+def test_boots_whose_clock_is_set_back_ask_for_a_restart_only_when_they_insist() -> None:
+    held = buffer("a", drivers="a")
+    for second in range(100, 105):
+        held.push("a", message(second * S, second))
+    for second in range(24):
+        assert held.push("a", message(second * S, 200 + second)) is Arrival.LATE
+        assert held.set_back_ns is None
+    held.push("a", message(24 * S, 224))
+    assert held.set_back_ns == 24 * S
+    assert held.restart(24 * S) == (24 - 104) * S
+    held.push("a", message(25 * S, 225))
+    held.push("a", message(26 * S, 226))
+    assert held.low_ns == 26 * S - WINDOW
+
+
+def test_a_backlog_after_silence_is_late_and_no_set_back() -> None:
+    held = buffer("a", drivers="a", patience=2 * S)
+    held.push("a", message(0, 0))
+    for second in range(1, 100):
+        held.advance(second * S)
+    assert held.low_ns == 97 * S
+    verdicts = {held.push("a", message(second * S, second)) for second in range(1, 80)}
+    assert verdicts == {Arrival.LATE}
+    assert held.set_back_ns is None
+
+
+def test_in_a_replay_sources_wait_for_one_another_whatever_they_are_apart() -> None:
+    held = ReorderBuffer(ReplayPulse(frozenset("a")), frozenset("ag"), capacity=None)
+    for number in range(5000):
+        assert held.push("g", message(number * S, number)) is Arrival.QUEUED
+        held.advance(number * S)
+    assert released(held) == []
+    for number in range(5):
+        held.push("a", message(number * S, number))
+    assert [time_ns for time_ns, _, _ in released(held)] == [0, 0, *sorted([S, 2 * S, 3 * S] * 2)]
+    held.flush()
+    assert len(released(held)) == 1 + 4996

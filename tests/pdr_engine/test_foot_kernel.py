@@ -55,14 +55,18 @@ def test_the_kernel_computes_what_the_oracle_computes(lever_sigma: float) -> Non
     n = 400
     accel, gyro = rng.normal(size=(n, 3)) * 8.0 + [0.0, 0.0, 9.8], rng.normal(size=(n, 3)) * 3.0
     clipped, steps = rng.random((n, 3)) < 0.05, rng.uniform(0.001, 0.02, n)
+    sigma = rng.uniform(0.0, 0.2, n)
+    state["sigma"][:n] = sigma
     state["accel"][:n], state["gyro"][:n], state["clipped"][:n] = accel, gyro, clipped
     for k in range(1, n):
         kernel.mechanise(state, k, steps[k])
         kernel.propagate(state, p, k, steps[k], False)
         oracle.predict(accel[k], gyro[k] - bias, steps[k], clipped[k])
         if k % 50 > 30:
+            kernel.creep(state, p, k, steps[k])
             kernel.zero_velocity(state, p, k, steps[k])
-            oracle.zero_velocity(gyro[k] - bias, steps[k])
+            oracle.creep(sigma[k], steps[k])
+            oracle.zero_velocity(gyro[k] - bias, steps[k], sigma[k])
         if k % 50 == 49:
             kernel.forget_place(state)
             oracle.forget_place()

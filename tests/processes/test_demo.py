@@ -110,6 +110,18 @@ def test_a_demo_stopped_early_leaves_no_process_behind(
     assert_none_left(children)
 
 
+def test_a_service_that_is_killed_ends_the_demo_with_what_was_scored(tmp_path: Path) -> None:
+    demo = start(tmp_path, "--speed", "4")
+    wait_until(lambda: all_run(demo), timeout_s=120.0, what="all eighteen processes")
+    children = children_of(demo.pid)
+    next(child for child in children if service_of(child) == "fusion").kill()
+    _, errors = demo.communicate(timeout=60)
+    assert demo.returncode == 2
+    assert "a1/fusion was killed by signal 9" in errors
+    assert json.loads((tmp_path / "result.json").read_text())["soldiers"]
+    assert_none_left(children)
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
@@ -117,6 +129,7 @@ def test_a_demo_stopped_early_leaves_no_process_behind(
         (("--speed", "0"), "--speed 0 must be above 0"),
         (("--loss", "2"), "--loss 2 must be a share"),
         (("--duration", "-1"), "--duration -1 must be a positive number"),
+        (("--json", "/nowhere/result.json"), "/nowhere/result.json: cannot be written"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(tmp_path: Path, arguments: tuple[str, ...], expected: str) -> None:

@@ -10,6 +10,7 @@ import pytest
 from bootprint.messages import Position
 from bootprint.stopping import Stop
 from bootprint.topics import Identity
+from proving_ground.exercises.emulated_radio import NetCounts
 from proving_ground.exercises.exercise import COMMAND_POST, LEADER, REALM, UNIT, Exercise, Soldier
 from proving_ground.exercises.inprocess import play_run, positions_of
 from proving_ground.exercises.observer import Heard
@@ -29,7 +30,7 @@ class Played:
     heard: dict[str, Heard]
     start_ns: int
     processes: int
-    net_datagrams: dict[str, int]
+    nets: dict[str, NetCounts]
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Played]:
             {name: observer.heard() for name, observer in stage.observers.items()},
             stage.start_ns,
             len(stage.processes.pids),
-            {name: net.counts.datagrams for name, net in stage.nets.items()},
+            {name: net.counts for name, net in stage.nets.items()},
         )
 
 
@@ -95,8 +96,8 @@ def test_the_command_post_hears_of_the_soldier_over_the_air_only(played: Played)
     newest = tracks[-1]
     last = played.heard["a1"].positions[-1]
     assert abs(newest.latitude_deg - last.latitude_deg) * 111_000 < 4.0
-    assert played.net_datagrams["squad"] >= len(tracks)
-    assert played.net_datagrams["company"] >= len(tracks)
+    assert played.nets["squad"].datagrams >= len(tracks)
+    assert played.nets["company"].datagrams >= len(tracks)
 
 
 def test_every_computer_reports_its_links_within_budget(played: Played) -> None:
@@ -106,6 +107,17 @@ def test_every_computer_reports_its_links_within_budget(played: Played) -> None:
         for link in links.values():
             assert link.bits_per_s <= link.budget_bits_per_s
             assert link.frames_lost == 0
+
+
+def test_hubs_pay_for_every_byte_that_the_air_carries(played: Played) -> None:
+    for net, counts in played.nets.items():
+        paid = [heard.links[net] for heard in played.heard.values() if net in heard.links]
+        sent = sum(link.frames_sent for link in paid)
+        assert counts.datagrams > 0
+        # A hub reports once a second: what it sent after its last report, the net has counted already.
+        assert 0 <= counts.datagrams - sent <= 2
+        if counts.datagrams == sent:
+            assert sum(link.bytes_sent for link in paid) == counts.bytes
 
 
 def test_every_service_ran_as_its_own_process(played: Played) -> None:

@@ -42,7 +42,8 @@ def test_a_process_that_ends_early_is_named_with_its_last_words(tmp_path: Path) 
         group.start(router_spec(tmp_path, "broken", listen="tcp/127.0.0.1:99999"))
         wait_until(group.failed)
         with pytest.raises(
-            ProcessError, match="broken ended with exit code 2: bootprint: cannot start a router"
+            ProcessError,
+            match=r"broken ended with exit code 2; .*broken.log: bootprint: cannot start a router",
         ):
             group.check()
 

@@ -10,6 +10,7 @@ import pytest
 from bootprint.errors import ConfigError
 from sa_hub.radio.links.udp import UdpLink
 from sa_hub.settings import LinkProfile
+from support.hub_squad import START_NS, S, Walk, hub, position
 
 GROUP = "239.255.77.7"
 
@@ -103,3 +104,30 @@ def test_addresses_that_cannot_be_used_are_refused(options: dict[str, object], m
         UdpLink(profile(**options), lambda data: None)
     assert "'squad'" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_every_peers_copy_is_paid_for() -> None:
+    """Real datagrams to three peers, counted where they arrive, against the law of the budget."""
+    ears = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(3)]
+    with ExitStack() as stack:
+        for ear in ears:
+            stack.enter_context(ear)
+            ear.bind(("127.0.0.1", 0))
+            ear.settimeout(5.0)
+        peers = tuple(f"127.0.0.1:{ear.getsockname()[1]}" for ear in ears)
+        link_profile = profile(bind="127.0.0.1:0", peers=peers)
+        link = UdpLink(link_profile, lambda data: None)
+        stack.callback(link.close)
+        core = hub("a1", link_profile)
+        air_bytes = 0
+        for step in range(600):
+            now_ns = START_NS + step * S // 10
+            # Turns all the time: there is more to say than three copies' budget allows.
+            core.handle(position("a1", now_ns, Walk(speed_m_s=25.0 * (-1) ** step)))
+            core.tick(now_ns)
+            for frame in core.take_frames():
+                link.send(frame.data)
+                air_bytes += sum(len(ear.recv(2048)) + link_profile.header_bytes for ear in ears)
+            assert 8 * air_bytes <= 1200 * step / 10
+        assert 8 * air_bytes > 0.9 * 1200 * 60
+        assert core._nets["squad"].meter.bytes_sent == air_bytes

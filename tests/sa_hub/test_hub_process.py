@@ -125,7 +125,9 @@ def _has_latency(message: Message) -> bool:
     return isinstance(message, Health) and 0.0 < message.gauges.get("latency_p99_ms", 0.0) < 5000.0
 
 
-@pytest.mark.parametrize("fault", ["no key", "open key", "short key", "unknown key in [hub]", "bad counters"])
+@pytest.mark.parametrize(
+    "fault", ["no key", "open key", "short key", "unknown key in [hub]", "bad counters", "lost counters"]
+)
 def test_what_is_wrong_is_said_in_one_line_and_exit_2(realm: Path, fault: str) -> None:
     config = write_computer(realm, "a1", "soldier", 0, 9)
     key = realm / "keys" / "group.key"
@@ -138,6 +140,9 @@ def test_what_is_wrong_is_said_in_one_line_and_exit_2(realm: Path, fault: str) -
             key.write_text("00" * 16)
         case "unknown key in [hub]":
             config.write_text(config.read_text().replace("[hub]", "[hub]\nheartbeat = 3"))
+        case "lost counters":
+            (realm / "a1" / "state" / "radio").mkdir(parents=True)
+            (realm / "a1" / "state" / "radio" / "net.heard").write_text('{"clean": true, "senders": {}}')
         case _:
             (realm / "a1" / "state" / "radio").mkdir(parents=True)
             (realm / "a1" / "state" / "radio" / "net.counters").write_text("{")

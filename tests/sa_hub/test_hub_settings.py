@@ -39,6 +39,10 @@ def test_defaults_fit_together() -> None:
         ({"links": [LINK, LINK]}, "stands there twice"),
         ({"links": [{**LINK, "name": "a/b"}]}, "letters, digits"),
         ({"links": [{**LINK, "rate_bits_per_s": 10, "header_bytes": 28}]}, "want a higher rate_bits_per_s"),
+        (
+            {"links": [{**LINK, "rate_bits_per_s": 100, "peers": ["h:1"] * 8}]},
+            "to 8 peer(s) may need 4352",
+        ),
         ({"links": [{**LINK, "mtu_bytes": 20}]}, "40"),
         ({"heartbeat_s": 80.0}, "heartbeat_s < stale_s < lost_s, got 80, 75, 180"),
         ({"lost_s": 500.0}, "400"),

@@ -13,7 +13,7 @@ from bootprint.errors import ConfigError
 from sa_hub.radio.counters import Block, FileCounters, MemoryCounters, _Reserved
 from sa_hub.radio.errors import FrameError
 from sa_hub.radio.layout import Kind
-from sa_hub.radio.replay_file import load_memory, save_memory
+from sa_hub.radio.replay_file import LAG, MemoryFile
 from sa_hub.radio.seal import NetKeys, Opener, Sealer, read_header
 
 KEY = bytes(range(32))
@@ -21,6 +21,24 @@ NOW_NS = 1_790_000_000_000_000_000
 MINUTE_NS = 60_000_000_000
 KEYS = NetKeys(KEY, "squad", 8)
 JAN_2026_S = 1_767_225_600.0
+SECONDS_2020_TO_2026 = 2192 * 86_400  # six years, two of them leap years
+
+
+class HostClock:
+    """A computer's clock that goes on when somebody sleeps."""
+
+    def __init__(self, now_s: float = JAN_2026_S) -> None:
+        self.now_s = now_s
+
+    def __call__(self) -> float:
+        return self.now_s
+
+    def sleep(self, seconds: float) -> None:
+        self.now_s += seconds
+
+    def counters(self, path: Path, block: int = 4, earlier_life: Path | None = None) -> FileCounters:
+        """A source of counters in a file, on this clock."""
+        return FileCounters(path, self, block, earlier_life=earlier_life, sleep=self.sleep)
 
 
 def sealer(number: int = 7, epoch: int = 1, keys: NetKeys = KEYS) -> Sealer:
@@ -159,25 +177,78 @@ def test_frames_of_an_earlier_epoch_are_replays() -> None:
     opener.open(new[1])
 
 
-def test_what_was_heard_is_remembered_over_a_restart(tmp_path: Path) -> None:
-    opener, path = Opener(KEYS), tmp_path / "squad.heard"
+def test_what_was_heard_is_remembered_over_a_clean_restart(tmp_path: Path) -> None:
+    opener, file = Opener(KEYS), MemoryFile(tmp_path / "squad.heard")
     frames = sealed(sealer(), 6)
     for frame in frames[:4]:
         opener.open(frame)
-    save_memory(path, opener.memory)
-    memory, sound = load_memory(path)
+        file.keep(opener.memory)
+    file.close(opener.memory)
+    memory, sound = MemoryFile(file.path).load()
     restarted = Opener(KEYS, memory)
     assert sound
     assert [cause(restarted, frame) for frame in frames[:4]] == ["replayed"] * 4
     restarted.open(frames[4])
 
 
+@given(
+    st.lists(st.tuples(st.sampled_from([3, 7]), st.integers(1, 12)), min_size=1, max_size=40), st.booleans()
+)
+@settings(max_examples=40, deadline=None)
+def test_after_a_power_cut_nothing_heard_is_taken_again_and_little_else_refused(
+    heard: list[tuple[int, int]], clean_start: bool
+) -> None:
+    senders = {number: sealer(number) for number in (3, 7)}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "squad.heard"
+        if clean_start:
+            MemoryFile(path).close({})
+        opener, file, taken = Opener(KEYS), MemoryFile(path), []
+        for number, skipped in [(3, 1), (7, 1), *heard]:
+            taken.append(sealed(senders[number], skipped)[-1])
+            opener.open(taken[-1])
+            file.keep(opener.memory)
+        memory, sound = MemoryFile(path).load()  # the power is cut here: nothing but what is synced is left
+    restarted = Opener(KEYS, memory)
+    assert sound
+    # A full header may follow any gap; a short one far behind is taken for one ahead, and does not fit that either.
+    assert {cause(restarted, frame) for frame in taken} <= {"replayed", "forged"}
+    for number in dict(heard):
+        later = [sealed(senders[number], 1)[0] for _ in range(LAG + 1)]
+        restarted.open(later[-1])
+
+
+def test_the_memory_is_not_written_for_every_frame(tmp_path: Path) -> None:
+    opener, file, written = Opener(KEYS), MemoryFile(tmp_path / "squad.heard"), set()
+    for frame in sealed(sealer(), 100):
+        opener.open(frame)
+        file.keep(opener.memory)
+        written.add(file.path.read_bytes())
+    assert len(written) == 100 // (LAG + 1)
+
+
+def test_memory_and_counters_are_written_under_names_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    temporary = []
+    replace = Path.replace
+
+    def noted(self: Path, target: Path) -> Path:
+        temporary.append(self.name)
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", noted)
+    HostClock().counters(tmp_path / "squad.counters").reserve()
+    MemoryFile(tmp_path / "squad.heard").close({})
+    assert len(set(temporary)) == 2
+
+
 @pytest.mark.parametrize("content", [b"", b"{", b'{"x": 1}', b'{"7": {"epoch": "a", "highest": 1}}'])
 def test_a_damaged_memory_is_reported_and_left_behind(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "squad.heard"
     path.write_bytes(content)
-    assert load_memory(path) == ({}, False)
-    assert load_memory(tmp_path / "none") == ({}, True)
+    assert MemoryFile(path).load() == ({}, False)
+    assert MemoryFile(tmp_path / "none").load() == ({}, True)
 
 
 # -- counters -------------------------------------------------------------------------------------------------
@@ -200,9 +271,10 @@ def used(block: Block, count: int) -> set[tuple[int, int]]:
 @settings(max_examples=20, deadline=None)
 def test_no_counter_comes_twice_over_restarts_and_power_cuts(boots: list[tuple[int, int, str]]) -> None:
     seen: set[tuple[int, int]] = set()
+    clock = HostClock()
     with tempfile.TemporaryDirectory() as folder:
         for reservations, spent, cut in boots:
-            source = CutCounters(Path(folder) / "squad.counters", lambda: JAN_2026_S, block=4)
+            source = CutCounters(Path(folder) / "squad.counters", clock, 4, sleep=clock.sleep)
             for _ in range(reservations):
                 take_new(seen, source.reserve(), 4)
             take_new(seen, source.reserve(), spent)
@@ -233,62 +305,118 @@ def take_new(seen: set[tuple[int, int]], block: Block, count: int) -> None:
 
 def test_two_processes_on_one_file_never_share_a_counter(tmp_path: Path) -> None:
     path = tmp_path / "squad.counters"
-    one, two = (FileCounters(path, lambda: JAN_2026_S, block=4) for _ in range(2))
+    clock = HostClock()
+    one, two = (clock.counters(path) for _ in range(2))
     blocks = [source.reserve() for source in (one, two, one, one, two, two, two)]
     numbers = [number for block in blocks for number in used(block, 4)]
     assert len(numbers) == len(set(numbers)) == 28
 
 
 def test_a_running_sender_goes_on_in_its_epoch(tmp_path: Path) -> None:
-    source = FileCounters(tmp_path / "c", lambda: JAN_2026_S, block=4)
-    first, second = source.reserve(), source.reserve()
-    assert second == Block(first.epoch, 4, 8)
+    clock = HostClock()
+    source = clock.counters(tmp_path / "c")
+    first = source.reserve()
+    clock.now_s += 1000.0
+    assert source.reserve() == Block(first.epoch, 4, 8)
 
 
-def test_a_lost_file_is_made_good_by_the_clock(tmp_path: Path) -> None:
-    path, later_s = tmp_path / "c", JAN_2026_S + 61
-    before = FileCounters(path, lambda: JAN_2026_S).reserve()
+def test_an_epoch_is_the_second_of_the_start_and_used_when_it_is_over(tmp_path: Path) -> None:
+    clock = HostClock(JAN_2026_S + 0.75)
+    assert clock.counters(tmp_path / "c").reserve() == Block(SECONDS_2020_TO_2026, 0, 4)
+    assert clock.now_s == JAN_2026_S + 1.0
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 1.5), st.booleans()), min_size=1, max_size=20))
+@settings(max_examples=40, deadline=None)
+def test_no_counter_comes_twice_when_files_are_lost_and_the_clock_is_right(
+    lives: list[tuple[float, bool]],
+) -> None:
+    clock, seen = HostClock(), set[tuple[int, int]]()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "c"
+        for lived_s, lost in lives:
+            take_new(seen, clock.counters(path).reserve(), 4)
+            clock.now_s += lived_s
+            if lost:
+                path.unlink()
+        assert max(epoch for epoch, _ in seen) <= clock.now_s - JAN_2026_S + SECONDS_2020_TO_2026
+
+
+def test_restarts_do_not_take_epochs_ahead_of_the_clock(tmp_path: Path) -> None:
+    path, clock = tmp_path / "c", HostClock()
+    first = clock.counters(path).reserve()
+    clock.now_s -= 3600.0
+    assert [clock.counters(path).reserve() for _ in range(3)] == [
+        Block(first.epoch, 4 * block, 4 * block + 4) for block in (1, 2, 3)
+    ]
+
+
+def test_lost_counters_of_a_hub_that_has_lived_are_not_made_up(tmp_path: Path) -> None:
+    path, heard, clock = tmp_path / "squad.counters", tmp_path / "squad.heard", HostClock()
+    clock.counters(path, earlier_life=heard).reserve()
+    MemoryFile(heard).close({})
+    clock.counters(path, earlier_life=heard).reserve()
     path.unlink()
-    assert FileCounters(path, lambda: later_s).reserve().epoch > before.epoch
+    with pytest.raises(
+        ConfigError, match=r"counters are lost.*squad\.heard.*restore.*new group key"
+    ) as caught:
+        clock.counters(path, earlier_life=heard).reserve()
+    assert "\n" not in str(caught.value)
+    assert not path.exists()
 
 
-def test_a_clock_set_back_does_not_take_the_epoch_back(tmp_path: Path) -> None:
+@pytest.mark.parametrize("now_s", [0.0, JAN_2026_S - SECONDS_2020_TO_2026 - 1.0, 2.7e9])
+def test_a_first_start_with_an_unset_clock_is_refused(tmp_path: Path, now_s: float) -> None:
+    with pytest.raises(ConfigError, match="clock is not between 2020 and 2054"):
+        HostClock(now_s).counters(tmp_path / "c").reserve()
+    clock = HostClock()
+    clock.counters(tmp_path / "c").reserve()
+    clock.now_s = now_s
+    assert clock.counters(tmp_path / "c").reserve() == Block(SECONDS_2020_TO_2026, 4, 8)
+
+
+def test_an_epoch_without_room_is_followed_by_the_next(tmp_path: Path) -> None:
     path = tmp_path / "c"
-    clocks_s = iter((JAN_2026_S, 0.0, 4e9, 1e6))
-    epochs = [FileCounters(path, clocks_s.__next__).reserve().epoch for _ in range(4)]
-    assert epochs == sorted(set(epochs))
+    path.write_text('{"epoch": 5, "end": 262141}')
+    assert HostClock(0.0).counters(path).reserve() == Block(6, 0, 4)
+    path.write_text('{"epoch": 5, "end": 262140}')
+    assert HostClock(0.0).counters(path).reserve() == Block(5, 262140, 262144)
 
 
 def test_the_last_epoch_is_used_to_its_end_and_then_a_new_key_is_asked_for(tmp_path: Path) -> None:
-    path = tmp_path / "c"
-    path.write_text('{"epoch": 16777215, "end": 16777208}')
-    assert FileCounters(path, lambda: JAN_2026_S, block=4).reserve() == Block(16777215, 16777208, 16777212)
-    assert FileCounters(path, lambda: JAN_2026_S, block=4).reserve() == Block(16777215, 16777212, 16777216)
+    path, clock = tmp_path / "c", HostClock()
+    path.write_text('{"epoch": 1073741823, "end": 262136}')
+    assert clock.counters(path).reserve() == Block(1073741823, 262136, 262140)
+    assert clock.counters(path).reserve() == Block(1073741823, 262140, 262144)
     with pytest.raises(ConfigError, match="new group key"):
-        FileCounters(path, lambda: JAN_2026_S, block=4).reserve()
+        clock.counters(path).reserve()
 
 
-@pytest.mark.parametrize("content", ["", "{", '{"epoch": 1}', '{"epoch": "a", "end": 1}'])
+@pytest.mark.parametrize(
+    "content", ["", "{", '{"epoch": 1}', '{"epoch": "a", "end": 1}', '{"epoch": 1073741824, "end": 1}']
+)
 def test_damaged_counters_are_refused_in_one_line(tmp_path: Path, content: str) -> None:
     path = tmp_path / "c"
     path.write_text(content)
     with pytest.raises(ConfigError, match="damaged radio counters") as caught:
-        FileCounters(path, lambda: JAN_2026_S).reserve()
+        HostClock().counters(path).reserve()
     assert "\n" not in str(caught.value)
 
 
 def test_counters_that_cannot_be_kept_are_refused(tmp_path: Path) -> None:
     (tmp_path / "state").write_text("a file where a folder is wanted")
     with pytest.raises(ConfigError, match="cannot be kept"):
-        FileCounters(tmp_path / "state" / "c", lambda: JAN_2026_S).reserve()
+        HostClock().counters(tmp_path / "state" / "c").reserve()
 
 
 def test_a_new_block_of_a_new_epoch_starts_with_full_headers(tmp_path: Path) -> None:
-    path = tmp_path / "c"
-    mine = FileCounters(path, lambda: JAN_2026_S, block=4)
+    path, clock = tmp_path / "c", HostClock()
+    mine = clock.counters(path)
     sender, opener = Sealer(KEYS, 7, mine), Opener(KEYS)
     frames = sealed(sender, 4)
-    FileCounters(path, lambda: JAN_2026_S, block=4).reserve()  # another process takes an epoch
+    clock.now_s += 1.0
+    clock.counters(path).reserve()  # another process takes an epoch
+    clock.now_s += 1.0
     assert sender.overhead_bytes(NOW_NS) == 16
     for frame in (*frames, *sealed(sender, 6)):
         opener.open(frame)

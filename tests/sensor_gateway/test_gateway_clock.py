@@ -58,15 +58,18 @@ steps = st.tuples(
 
 @given(st.lists(steps, min_size=1, max_size=60))
 @settings(deadline=None)
-def test_stamps_never_go_back_for_stamps_that_advance_or_restart(moves: list[tuple[int, int]]) -> None:
+def test_stamps_never_go_back_uncounted_for_stamps_that_advance_or_restart(
+    moves: list[tuple[int, int]],
+) -> None:
     """Whatever device (advance, leap, restart) and host (delay, set forward, set back) do."""
     clock = DeviceClock()
     device, received = 10**16, UTC_NS
     newest = clock.utc_ns(device, received)
     for device_step, host_step in moves:
         device, received = device + device_step, received + host_step
+        counted = clock.set_backs
         mapped = clock.utc_ns(device, received)
-        assert mapped > newest
+        assert mapped > newest or clock.set_backs > counted
         newest = mapped
 
 
@@ -136,6 +139,66 @@ def test_the_device_s_own_utc_goes_before_the_host_s() -> None:
     clock.observe(4 * S, UTC_NS - 60 * S)  # the computer is a minute slow
     clock.state_utc(4 * S, UTC_NS)
     assert clock.utc_ns(5 * S, UTC_NS - 59 * S) == UTC_NS + S
+
+
+WEEKS_1024 = 1024 * 7 * 86_400 * S
+
+
+def stamp_error_ns(clock: DeviceClock, second: int, stated_error_ns: int | None = 0) -> int:
+    """One second of a 10 Hz device, whose first sample comes with its word on UTC; the last stamp's error."""
+    for tenth in range(10):
+        device = second * S + tenth * 100 * MS
+        error = clock.utc_ns(device, UTC_NS + device) - UTC_NS - device
+        if tenth == 0 and stated_error_ns is not None:
+            clock.state_utc(device, UTC_NS + device + stated_error_ns)
+    return error
+
+
+def test_one_wrong_statement_of_utc_is_not_believed() -> None:
+    """A receiver's week counter wraps for one message."""
+    clock = DeviceClock()
+    statements = [0] * 5 + [WEEKS_1024] + [0] * 5 + [WEEKS_1024, -WEEKS_1024, WEEKS_1024] + [0] * 3
+    assert {stamp_error_ns(clock, second, error) for second, error in enumerate(statements)} == {0}
+    assert (clock.doubted, clock.steps, clock.set_backs) == (4, 0, 0)
+
+
+def test_the_same_statement_over_three_ways_is_one() -> None:
+    clock = DeviceClock()
+    stamp_error_ns(clock, 0)
+    for _ in range(5):
+        clock.state_utc(S, UTC_NS + S + WEEKS_1024)
+    assert stamp_error_ns(clock, 1, None) == 0
+
+
+def test_statements_that_agree_are_believed_and_taken_back_when_better_ones_agree() -> None:
+    """Forward with the third; back with the third and five seconds, once, instead of at half a percent."""
+    clock = DeviceClock()
+    errors = [stamp_error_ns(clock, second, WEEKS_1024 if 2 <= second < 6 else 0) for second in range(20)]
+    assert errors[:5] == [0, 0, 0, 0, WEEKS_1024]
+    assert errors[7] > WEEKS_1024 - S
+    assert errors[14:] == [0] * 6
+    assert (clock.steps, clock.set_backs, clock.resets) == (2, 1, 0)
+
+
+def test_a_host_clock_set_back_is_followed_after_five_seconds() -> None:
+    clock = DeviceClock()
+    for number in range(100):
+        clock.utc_ns(number * 10 * MS, UTC_NS + number * 10 * MS)
+    behind = [
+        clock.utc_ns(n * 10 * MS, UTC_NS - 3600 * S + n * 10 * MS) - n * 10 * MS for n in range(100, 800)
+    ]
+    assert min(behind[:490]) > UTC_NS - S
+    assert behind[510] == UTC_NS - 3600 * S
+    assert clock.set_backs == 1
+
+
+def test_a_second_too_far_ahead_is_made_up_slowly() -> None:
+    clock = DeviceClock()
+    for number in range(100):
+        clock.utc_ns(number * 10 * MS, UTC_NS + number * 10 * MS)
+    stamps = [clock.utc_ns(n * 10 * MS, UTC_NS - 900 * MS + n * 10 * MS) for n in range(100, 3000)]
+    assert all(later > earlier for earlier, later in pairwise(stamps))
+    assert clock.set_backs == 0
 
 
 def test_the_line_lies_under_its_points_and_knows_the_slope() -> None:

@@ -191,6 +191,24 @@ def test_in_a_mixed_stream_ubx_is_preferred_and_every_byte_may_come_alone() -> N
     assert [fix.time_ns for fix in told] == [utc_ns(2026, 3, 4, 5, 6, s) - 250 for s in (7, 8, 9)]
 
 
+def stamped_by(decoder: GnssDecoder, *parts: str | bytes) -> list[str]:
+    data = b"".join(nmea(part) if isinstance(part, str) else part for part in parts)
+    return [
+        reading.stamped_by for reading in decoder.feed(data, ARRIVAL) if isinstance(reading, MessageReading)
+    ]
+
+
+def test_who_told_a_stamp_is_said() -> None:
+    """A date comes with RMC or ZDA; leap seconds are sure when the receiver says so."""
+    zda = "GPZDA,123518.00,23,03,2026,00,00"
+    timeless = "GPGGA,,,,,,0,00,,,M,,M,,"
+    assert stamped_by(receiver(), GGA, NEXT_GGA) == ["host_date", "host_date"]
+    assert stamped_by(receiver(), timeless, GGA, RMC, NEXT_GGA) == ["arrival", "sensor"]
+    assert stamped_by(receiver(), zda, GGA, NEXT_GGA) == ["sensor", "sensor"]
+    unsure, sure, none = pvt(), pvt(second=8, fullyResolved=1), pvt(validDate=0)
+    assert stamped_by(receiver("ubx"), unsure, sure, none) == ["host_date", "sensor", "arrival"]
+
+
 def test_the_end_of_the_stream_gives_out_the_last_epoch() -> None:
     decoder = receiver()
     assert fixes(decoder, GGA) == []

@@ -1,5 +1,6 @@
 """The gateway as a whole: as a part in its scaffold, and as a real process on a real bus."""
 
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -7,9 +8,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+import structlog
 
 from bootprint import wire
 from bootprint.bus import Envelope
+from bootprint.clock import ScaledClock
 from bootprint.config import load_computer
 from bootprint.errors import ConfigError, RecordingError
 from bootprint.messages import Health, ImuBatch
@@ -20,7 +23,8 @@ from sensor_gateway.gateway import build
 from sensor_gateway.recordings import load_runs
 from sensor_gateway.sources.replay import DEFAULT_START_NS, run_messages
 from support.routers import running_router
-from support.sensor_device import MavlinkSender, PtyDevice
+from support.sensor_device import UTC_NS, MavlinkSender, PtyDevice
+from support.ubx_receiver import pvt_at
 from support.waiting import wait_until
 
 A1 = Identity("bp", "alpha", "a1")
@@ -30,6 +34,7 @@ origin = { latitude_deg = 59.0, longitude_deg = 18.0 }
 roster = [{ id = "a1", number = 1, unit = "alpha" }]
 """
 SAMPLES = 4000
+S = 1_000_000_000
 
 
 def write_config(folder: Path, sources: str) -> Path:
@@ -91,6 +96,34 @@ def test_an_unplugged_sensor_is_degraded_and_a_stop_loses_nothing(tmp_path: Path
     out += part.close()
     assert [len(envelope.message.times) for envelope in out if isinstance(envelope.message, ImuBatch)] == [7]
     device.unplug()
+
+
+def test_a_receiver_tells_how_wrong_the_computer_s_clock_is(tmp_path: Path) -> None:
+    """An hour ahead: gauge, counter and note say so, and it is logged once."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.bind(("127.0.0.1", 0))
+        port = sender.getsockname()[1]
+    world = context(tmp_path, f'{{ kind = "udp", port = {port}, protocol = "ubx" }}')
+    host_ns = [UTC_NS + 3600 * S]
+    world.clock = ScaledClock(1.0, 0, lambda: host_ns[0])
+    part = build(world)
+    with structlog.testing.capture_logs() as logs:
+        world.log = structlog.get_logger()
+        part.start()
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for second in range(8):
+                host_ns[0] = UTC_NS + (3600 + second) * S
+                sender.sendto(pvt_at(UTC_NS + second * S), ("127.0.0.1", port))
+                job = world.inbox.get(timeout=5.0)
+                assert callable(job)
+                assert [envelope.message.time_ns for envelope in job()] == [UTC_NS + second * S]
+                assert list(part.tick(host_ns[0])) == []
+        figures = part.figures()
+    world.finish()
+    list(part.close())
+    assert (figures.gauges["utc_offset_s"], figures.counters["utc_offset_steps"]) == (-3600.0, 1)
+    assert figures.note == "this computer's clock is 3600.0 s ahead of satellite time"
+    assert [entry["utc_offset_s"] for entry in logs] == [-3600.0]
 
 
 @contextmanager

@@ -114,6 +114,8 @@ def test_no_router_is_one_line_and_exit_2(tmp_path: Path) -> None:
         ("colour = 1\n", (), "unknown key 'colour'"),
         ("[gatewy]\n", (), "did you mean 'gateway'"),
         ("", ("--speed", "fast"), "--speed 'fast'"),
+        ("", ("--clock-origin", "inf"), "--clock-origin inf"),
+        ("[fusion]\nreorder_window_s = inf\n", (), "fusion.reorder_window_s is inf"),
         ("", ("--log-level", "loud"), "--log-level 'loud'"),
         ("=", (), "not valid TOML"),
     ],
@@ -131,3 +133,25 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
     code, errors = end_of(start(tmp_path / "nowhere.toml", free_endpoint()))
     assert code == 2
     assert "nowhere.toml: no such file" in errors
+
+
+def test_a_router_that_was_gone_is_told_of(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    health: list[Health] = []
+    with running_router(endpoint):
+        process = start(write_config(tmp_path), endpoint)
+        watcher = open_bus(endpoint)
+        wait_until(lambda: watcher.alive(A1.selector("health")), what="the liveliness token")
+        watcher.close()
+    assert process.stderr
+    while "router lost" not in process.stderr.readline():
+        assert process.poll() is None
+    with running_router(endpoint):
+        watcher = open_bus(endpoint)
+        watcher.subscribe(A1.selector("health"), lambda e: health.append(e.message))
+        wait_until(lambda: health and health[-1].counters["router_losses"] == 1, what="the loss is reported")
+        watcher.close()
+        process.terminate()
+        code, errors = end_of(process)
+    assert code == 0
+    assert "router back" in errors

@@ -1,14 +1,17 @@
 """The zenoh bus against a real router in this process."""
 
+import subprocess
+import sys
 import threading
 import time
 
 import pytest
 
+from bootprint import wire
 from bootprint.bus import Envelope
 from bootprint.errors import BusError
 from bootprint.messages import FootStep, Health, Pressure
-from bootprint.topics import Identity
+from bootprint.topics import BY_SUBJECT, Identity
 from bootprint.zenoh_bus import EmbeddedRouter, open_bus
 from support.routers import free_endpoint, running_router
 from support.waiting import wait_until
@@ -127,6 +130,37 @@ def test_no_router_is_an_error_in_words() -> None:
     endpoint = free_endpoint()
     with pytest.raises(BusError, match=f"no router at {endpoint}.*bootprint router"):
         open_bus(endpoint, timeout_s=0.3)
+
+
+@pytest.mark.parametrize("router", ["bogus", "", "tcp/127.0.0.1"])
+def test_an_address_that_is_none_is_an_error_in_words(router: str) -> None:
+    with pytest.raises(BusError, match="router"):
+        open_bus(router, timeout_s=0.3)
+
+
+def test_the_bus_knows_whether_its_router_is_there() -> None:
+    endpoint = free_endpoint()
+    with running_router(endpoint):
+        bus = open_bus(endpoint)
+        assert bus.is_connected()
+    wait_until(lambda: not bus.is_connected(), what="the router is gone")
+    with running_router(endpoint):
+        wait_until(bus.is_connected, what="the router is back")
+        bus.close()
+
+
+def test_decoders_stand_before_any_thread_asks_for_one() -> None:
+    # Two threads that build msgspec decoders of one struct at once crash the process.
+    script = (
+        "import sys, threading; sys.setswitchinterval(1e-6);"
+        "from bootprint import wire; from bootprint.messages import Pressure;"
+        "data = wire.encode(Pressure(time_ns=1, pressure_pa=1.0));"
+        "threads = [threading.Thread(target=wire.decode, args=('pressure', data)) for _ in range(24)];"
+        "[t.start() for t in threads]; [t.join() for t in threads]"
+    )
+    for _ in range(3):
+        assert subprocess.run([sys.executable, "-c", script], timeout=30).returncode == 0
+    assert set(wire._DECODERS) == set(BY_SUBJECT)
 
 
 def test_waiting_for_a_router_can_be_interrupted() -> None:

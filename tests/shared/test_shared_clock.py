@@ -3,6 +3,7 @@
 import pytest
 
 from bootprint.clock import DataClock, ScaledClock, make_clock
+from bootprint.errors import ConfigError
 
 ORIGIN_NS = 1_700_000_000_000_000_000
 S = 1_000_000_000
@@ -69,3 +70,21 @@ def test_the_command_line_chooses_the_clock() -> None:
     assert since_s is not None
     assert earlier_s is not None
     assert earlier_s - since_s == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("speed", "origin_s", "said"),
+    [
+        ("abc", None, "--speed 'abc' must be a positive number or 'max'"),
+        ("nan", None, "--speed 'nan'"),
+        ("0", None, "--speed '0'"),
+        ("1e6", None, "--speed '1e6'"),
+        ("1", float("nan"), "--clock-origin nan must be UTC seconds since 1970"),
+        ("max", float("inf"), "--clock-origin inf"),
+        ("1", -1.0, "--clock-origin -1.0"),
+        ("1", 4_102_444_800.0, "--clock-origin 4102444800.0"),
+    ],
+)
+def test_a_clock_that_cannot_be_is_refused(speed: str, origin_s: float | None, said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        make_clock(speed, origin_s)

@@ -205,7 +205,7 @@ def test_rates_are_shown_as_a_table(router: str) -> None:
 
 
 def test_a_fix_is_published(router: str) -> None:
-    with listening(router) as heard:
+    with listening(router) as heard, running_fusion(router):
         run("fix", "-33.9", "18.4", "--realm", "bp", "--unit", "alpha", "--soldier", "a3",
             "--azimuth", "-90", "--at", 12, "--router", router)  # fmt: skip
         wait_until(lambda: heard, what="the fix")
@@ -218,6 +218,37 @@ def test_a_fix_is_published(router: str) -> None:
             azimuth_sigma_rad=math.radians(10.0),
         )
     ]
+
+
+@contextmanager
+def running_fusion(router: str) -> Iterator[None]:
+    """A3's fusion as the router sees it: its liveliness token."""
+    bus = open_bus(router)
+    bus.declare_alive(A3, "fusion")
+    wait_until(lambda: bus.alive(A3.selector("health", "fusion")), what="the token")
+    try:
+        yield
+    finally:
+        bus.close()
+
+
+def test_a_fix_that_nobody_hears_is_an_error(router: str) -> None:
+    with pytest.raises(BusError, match="neither fusion nor sa-hub of a3 runs"):
+        run("fix", "1", "2", "--realm", "bp", "--unit", "alpha", "--soldier", "a3", "--router", router)
+
+
+@pytest.mark.parametrize(
+    "arguments", [["bus", "echo", "a//b"], ["bus", "rates", "***"], ["record", "OUT", "--selector", "#"]]
+)
+def test_a_selector_that_is_none_is_one_line(router: str, tmp_path: Path, arguments: list[str]) -> None:
+    named = [str(tmp_path / "out.mcap") if argument == "OUT" else argument for argument in arguments]
+    with pytest.raises(BusError, match="is no selector of keys"):
+        run(*named, "--router", router, "--duration", "0.1")
+
+
+def test_a_realm_that_is_none_is_refused(router: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="--realm 'a/b' must be"):
+        run("record", tmp_path / "out.mcap", "--realm", "a/b", "--router", router, "--duration", "0.1")
 
 
 def test_info_tells_counts_and_times(walk: Path) -> None:
@@ -251,6 +282,11 @@ def test_info_salvages_a_damaged_recording(walk: Path, tmp_path: Path) -> None:
         (["replay", "WALK", "--subject", "imus"], ConfigError, "--subject 'imus' is unknown; known: imu"),
         (["info", "WALK", "--json", "/none/x.json"], ConfigError, "--json /none/x.json: cannot be written"),
         (["fix", "1", "2"], ConfigError, "whose place is it"),
+        (
+            ["fix", "1", "2", "--azimuth", "400", "--realm", "r", "--unit", "u", "--soldier", "s"],
+            ConfigError,
+            "--azimuth 400 must be",
+        ),
         (
             ["fix", "91", "2", "--realm", "r", "--unit", "u", "--soldier", "s"],
             ConfigError,

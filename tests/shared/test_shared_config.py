@@ -1,5 +1,6 @@
 """Configuration errors say the file, the place, what stands there and what would be right."""
 
+import math
 import re
 from pathlib import Path
 
@@ -85,7 +86,8 @@ def test_a_computer_knows_its_realm_and_its_paths(tmp_path: Path) -> None:
         ("number = 1023", 'number = "7"', "roster[1].number is '7': expected int"),
         ("number = 1023", "number = 1024", "roster[1].number is 1024: expected int <= 1023"),
         ("47.05", "97.05", "origin.latitude_deg is 97.05: expected float <= 90.0"),
-        ("480.0", "nan", "origin: height_m is nan, expected a number"),
+        ("480.0", "nan", "origin.height_m is nan: expected a number within ±1e+12"),
+        ("480.0", "-inf", "origin.height_m is -inf: expected a number within ±1e+12"),
         ("number = 1023\n", "", "roster[1] lacks the key 'number'"),
         ('id = "bp"', "", "missing the key 'id'"),
         ("number = 1023", "number = 1", "roster has number 1 more than once; make each unique"),
@@ -135,6 +137,42 @@ def test_what_is_wrong_with_a_realm_is_said_in_one_line(
 def test_nested_tables_and_lists_are_named_down_to_the_key(values: object, complaint: str) -> None:
     with pytest.raises(ConfigError, match=re.escape(f"here: {complaint}")):
         convert(values, Gateway, where="here")
+
+
+class Times(Config, frozen=True):
+    """Own checks after conversion must not put the common ones out of force."""
+
+    wait_s: float = 1.0
+    batch_ms: float = 1.0
+    start_time_s: float = 0.0
+    rate_bits_per_s: float = 1.0
+    name: str = ""
+    waits: tuple[Pdr, ...] = ()
+
+    def __post_init__(self) -> None:
+        assert self.wait_s < 1e9
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        ({"wait_s": math.inf}, "wait_s is inf: expected a number within ±1e+07"),
+        ({"wait_s": math.nan}, "wait_s is nan: expected a number within ±1e+07"),
+        ({"wait_s": -1e300}, "wait_s is -1e+300: expected a number within ±1e+07"),
+        ({"wait_s": 10_000_001}, "wait_s is 10000001: expected a number within ±1e+07"),
+        ({"batch_ms": 1.1e10}, "batch_ms is 11000000000.0: expected a number within ±1e+10"),
+        ({"waits": [{}, {"rate_hz": math.inf}]}, "waits[1].rate_hz is inf: expected a number"),
+        ({"waits": [{"rate_hz": [1.0, math.nan]}]}, "waits[0].rate_hz[1] is nan: expected a number"),
+    ],
+)
+def test_numbers_that_are_none_or_beyond_all_sense_are_named(values: object, complaint: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(f"here: {complaint}")):
+        convert(values, Times, where="here")
+
+
+def test_large_numbers_that_make_sense_are_taken() -> None:
+    values = {"wait_s": 1e7, "batch_ms": 1e10, "start_time_s": 1.8e9, "rate_bits_per_s": 54e6, "name": "inf"}
+    assert convert(values, Times, where="here") == Times(**values)
 
 
 def test_a_section_is_checked_by_the_service_it_belongs_to(tmp_path: Path) -> None:

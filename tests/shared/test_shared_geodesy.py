@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bootprint.config import Origin
-from bootprint.geodesy import LocalFrame, azimuth_of, wrap_angle, yaw_of_azimuth
+from bootprint.geodesy import LocalFrame, azimuth_of, major_axis_sigma_m, wrap_angle, yaw_of_azimuth
 
 A_M = 6_378_137.0
 F = 1 / 298.257223563
@@ -128,3 +128,16 @@ def test_yaw_runs_counter_clockwise_from_east(azimuth_deg: float, yaw_deg: float
 @given(azimuth=angles)
 def test_yaw_is_its_own_inverse(azimuth: float) -> None:
     assert math.cos(yaw_of_azimuth(yaw_of_azimuth(azimuth)) - azimuth) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 0.3, math.pi / 4, 2.0])
+def test_the_major_axis_is_the_longer_one_however_the_ellipse_lies(turn_rad: float) -> None:
+    long_m2, short_m2 = 9.0, 4.0
+    cosine, sine = math.cos(turn_rad), math.sin(turn_rad)
+    ee = long_m2 * cosine**2 + short_m2 * sine**2
+    nn = long_m2 * sine**2 + short_m2 * cosine**2
+    assert major_axis_sigma_m(ee, (long_m2 - short_m2) * sine * cosine, nn) == pytest.approx(3.0)
+
+
+def test_a_covariance_that_is_none_has_no_axis() -> None:
+    assert major_axis_sigma_m(-1e-18, 0.0, -1e-18) == 0.0

@@ -21,13 +21,16 @@ def cross_matrix(v: np.ndarray) -> np.ndarray:
 class Noise:
     """Densities and sigmas, named as the filter's settings."""
 
-    accel: float = 0.035
+    accel: float = 0.015
     gyro: float = 0.0006
     accel_scale: float = 0.006
+    gyro_scale: float = 0.001
     bias_sigma: float = 0.0
-    clip: float = 0.07
+    clip: float = 0.12
     velocity_sigma: float = 0.01
-    gate: float = 5.0
+    learned: float = 3.0
+    hidden_motion: float = 0.3
+    gate: float = 3.0
 
 
 @dataclass
@@ -66,7 +69,9 @@ class Oracle:
         shaking = self.noise.accel_scale * np.linalg.norm(motion)
         Q[VELOCITY, VELOCITY] = (self.noise.accel**2 + shaking**2) * dt * np.eye(3)
         C = self.attitude.as_matrix()
-        Q[ATTITUDE, ATTITUDE] = (self.noise.gyro**2 + self.noise.bias_sigma**2) * dt * np.eye(3)
+        turning = self.noise.gyro_scale * np.linalg.norm(rate)
+        angle = self.noise.gyro**2 + turning**2 + self.noise.bias_sigma**2
+        Q[ATTITUDE, ATTITUDE] = angle * dt * np.eye(3)
         Q[ATTITUDE, ATTITUDE] += C @ np.diag(clipped * self.noise.clip**2 * dt) @ C.T
         self.P = F @ self.P @ F.T + Q
 
@@ -83,10 +88,15 @@ class Oracle:
         H[:, LEVER] = C @ cross_matrix(rate)
         return H
 
-    def zero_velocity(self, rate: np.ndarray, dt: float) -> None:
+    def creep(self, sigma: float, dt: float) -> None:
+        """What stance hides: the place wanders by a velocity σ that lasts a while."""
+        self.P[POSITION, POSITION] += sigma**2 * self.noise.hidden_motion * dt * np.eye(3)
+
+    def zero_velocity(self, rate: np.ndarray, dt: float, sigma: float = 0.0) -> None:
         """The Joseph form, with the measurement's noise inflated where the innovation passes the gate."""
         H, y = self.jacobian(rate), -self.sole_velocity(rate)
-        S = H @ self.P @ H.T + self.noise.velocity_sigma**2 * 0.005 / dt * np.eye(3)
+        variance = self.noise.velocity_sigma**2 + (self.noise.learned * sigma) ** 2
+        S = H @ self.P @ H.T + variance * 0.005 / dt * np.eye(3)
         distance = np.sqrt(y @ np.linalg.solve(S, y))
         S = S * max(1.0, distance / self.noise.gate)
         R = S - H @ self.P @ H.T

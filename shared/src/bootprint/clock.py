@@ -9,7 +9,11 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
+from bootprint.errors import ConfigError
+
 NS_PER_S = 1_000_000_000
+_YEAR_2100_S = 4_102_444_800
+_MAX_SPEED = 1e6
 
 
 class EventClock(Protocol):
@@ -78,8 +82,23 @@ class DataClock:
 
 
 def make_clock(speed: str, origin_s: float | None) -> EventClock:
-    """A clock from the command line's ``--speed`` (a number, or ``max``) and ``--clock-origin`` (UTC seconds)."""
+    """A clock from the command line's ``--speed`` (a number, or ``max``) and ``--clock-origin`` (UTC seconds).
+
+    ConfigError if either makes no sense.
+    """
+    if origin_s is not None and not 0 <= origin_s < _YEAR_2100_S:
+        raise ConfigError(f"--clock-origin {origin_s} must be UTC seconds since 1970, before the year 2100")
     if speed == "max":
         return DataClock()
     origin_ns = time.time_ns() if origin_s is None else round(origin_s * NS_PER_S)
-    return ScaledClock(float(speed), origin_ns)
+    return ScaledClock(_speed(speed), origin_ns)
+
+
+def _speed(text: str) -> float:
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = 0.0
+    if not 0 < speed < _MAX_SPEED:
+        raise ConfigError(f"--speed {text!r} must be a positive number or 'max'")
+    return speed

@@ -5,7 +5,6 @@ roster and the names of the keys. ``computer.toml`` is this computer's own: who 
 is, and one section for each service, which that service alone understands (`section`).
 """
 
-import math
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,15 +19,13 @@ from bootprint.topics import Identity, check_part
 
 T = TypeVar("T")
 
+# The largest number that makes sense under a key of such an ending; nanoseconds must fit into 64 bits.
+_LARGEST_BY_ENDING = {"_bits_per_s": 1e12, "_time_s": 1e12, "_s": 1e7, "_ms": 1e10}
+_LARGEST = 1e12
+
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Base of every configuration table: unknown keys are refused, and so is TOML's ``nan``."""
-
-    def __post_init__(self) -> None:
-        for name in self.__struct_fields__:
-            value = getattr(self, name)
-            if isinstance(value, float) and math.isnan(value):
-                raise ValueError(f"{name} is nan, expected a number")
+    """Base of every configuration table: unknown keys are refused."""
 
 
 class Origin(Config, frozen=True):
@@ -164,7 +161,26 @@ def load_toml(path: Path, type_: type[T]) -> T:
 
 def convert(values: object, type_: type[T], where: str) -> T:
     """Convert plain values strictly; ConfigError tells ``where`` and what is known there."""
+    _check_numbers(values, "", where)
     try:
         return msgspec.convert(values, type_)
     except msgspec.ValidationError as error:
         raise ConfigError(f"{where}: {explain(str(error), values, type_)}") from error
+
+
+def _check_numbers(value: object, key: str, where: str) -> None:
+    """TOML knows ``nan``, ``inf`` and 1e300, types do not refuse them: ConfigError names the key they stand at."""
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            _check_numbers(inner, f"{key}.{name}" if key else str(name), where)
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            _check_numbers(inner, f"{key}[{index}]", where)
+    elif isinstance(value, float | int) and not abs(value) <= (largest := _largest(key)):
+        raise ConfigError(f"{where}: {key} is {value}: expected a number within ±{largest:g}")
+
+
+def _largest(key: str) -> float:
+    """By the first ending that fits."""
+    found = (largest for ending, largest in _LARGEST_BY_ENDING.items() if key.endswith(ending))
+    return next(found, _LARGEST)

@@ -103,8 +103,9 @@ def _wrong_value(what: str, place: _Place, parent: _Place) -> str:
     choices = place.choices() or tags
     expected = f"one of {', '.join(choices)}" if choices else _expected(what)
     shown = "" if isinstance(place.value, dict | list) else f" is {place.value!r}"
-    where = f"{place.path}{shown}" if place.path else "the file"
-    return f"{where}: expected {expected}" if expected else f"{where}: {what}"
+    if not expected:  # a sentence of the table's own check
+        return f"{place.path}: {what}" if place.path else what
+    return f"{f'{place.path}{shown}' if place.path else 'the file'}: expected {expected}"
 
 
 def _expected(what: str) -> str:

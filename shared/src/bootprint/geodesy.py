@@ -64,3 +64,9 @@ def ground_offset(
     turn = wrap_angle(math.radians(to_deg[1] - from_deg[1]))
     east = (normal_m + height_m) * math.cos(middle) * turn
     return east, (meridian_m + height_m) * math.radians(to_deg[0] - from_deg[0])
+
+
+def major_axis_sigma_m(ee: float, en: float, nn: float) -> float:
+    """Sigma along the major axis of a horizontal covariance, m: the root of its larger eigenvalue."""
+    half_trace = 0.5 * (ee + nn)
+    return math.sqrt(max(0.0, half_trace + math.hypot(0.5 * (ee - nn), en)))

@@ -20,7 +20,7 @@ from bootprint import logs
 from bootprint.bus import Core, Envelope
 from bootprint.clock import EventClock, make_clock
 from bootprint.config import Computer, load_computer
-from bootprint.errors import BootprintError, ConfigError
+from bootprint.errors import BootprintError
 from bootprint.figures import Figures
 from bootprint.messages import Health
 from bootprint.stopping import Stop
@@ -221,24 +221,12 @@ class Service:
             log_json=log_json,
         )
         try:
-            _check_speed(speed)
             logs.configure(log_level, json=log_json)
             code = run(self, Context(self.name, load_computer(config), options))
         except BootprintError as error:
             sys.stderr.write(f"{self.name}: {error}\n")
             code = EXIT_BAD_INPUT
         raise typer.Exit(code)
-
-
-def _check_speed(speed: str) -> None:
-    if speed == "max":
-        return
-    try:
-        good = 0 < float(speed) < 1e6
-    except ValueError:
-        good = False
-    if not good:
-        raise ConfigError(f"--speed {speed!r} must be a positive number or 'max'")
 
 
 def run(service: Service, context: Context) -> int:
@@ -275,6 +263,8 @@ class _Loop:
         self._context = context
         self._errors = 0
         self._health_sequence = 0
+        self._connected = True
+        self._router_losses = 0
 
     def run(self) -> None:
         context, part = self._context, self._part
@@ -322,8 +312,17 @@ class _Loop:
             self._errors += 1
             self._context.log.exception("handler failed", error=str(error), count=self._errors)
 
+    def _watch_router(self) -> None:
+        """Tell of a router that is gone or back: what was said meanwhile may be lost."""
+        connected = self._context.bus.is_connected()
+        if connected != self._connected:
+            self._connected = connected
+            self._router_losses += not connected
+            self._context.log.warning("router back" if connected else "router lost")
+
     def _health(self, *, stopped: bool = False) -> Iterable[Envelope]:
         context = self._context
+        self._watch_router()
         figures = self._part.figures()
         usage = resource.getrusage(resource.RUSAGE_SELF)
         self._health_sequence += 1
@@ -339,6 +338,7 @@ class _Loop:
                     "handler_errors": self._errors,
                     "bus_rejected": context.bus.rejected,
                     "inbox_dropped": context.inbox_dropped,
+                    "router_losses": self._router_losses,
                 },
                 gauges={
                     **figures.gauges,

@@ -27,7 +27,10 @@ class Qos(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """One row of the table; ``rate_hz`` is what one source is expected to send, None for events."""
+    """One row of the table; ``rate_hz`` is what one source is expected to send, None for events.
+
+    ``tolerance`` is how many times as fast or as slow (beyond once) is still as expected.
+    """
 
     subject: str
     message: type[m.Message]
@@ -36,12 +39,15 @@ class Topic:
     publisher: str
     recorded: bool
     meaning: str
+    tolerance: float = 0.2
 
 
 TOPICS: tuple[Topic, ...] = (
-    Topic("imu", m.ImuBatch, Qos.STREAM, 20.0, "sensor-gateway", True, "inertial samples, ~10 a message"),
-    Topic("pressure", m.Pressure, Qos.STREAM, 10.0, "sensor-gateway", True, "air pressure"),
-    Topic("gnss", m.GnssFix, Qos.STREAM, 1.0, "sensor-gateway", True, "satellite fixes"),
+    Topic(
+        "imu", m.ImuBatch, Qos.STREAM, 20.0, "sensor-gateway", True, "inertial samples, ~10 a message", 1.0
+    ),
+    Topic("pressure", m.Pressure, Qos.STREAM, 10.0, "sensor-gateway", True, "air pressure", 1.0),
+    Topic("gnss", m.GnssFix, Qos.STREAM, 1.0, "sensor-gateway", True, "satellite fixes", 9.0),
     Topic("camera_motion", m.CameraMotion, Qos.STREAM, 10.0, "sensor-gateway", True, "visual odometry"),
     Topic("range", m.Range, Qos.STREAM, 1.0, "sensor-gateway", True, "ranges to feet, peers, beacons"),
     Topic("foot_step", m.FootStep, Qos.ASSURED, None, "pdr-engine", True, "stance-to-stance displacement"),

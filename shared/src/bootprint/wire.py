@@ -1,7 +1,5 @@
 """Messages to bytes and back: MessagePack maps, typed and checked by the topic they travel under."""
 
-from functools import cache
-
 import msgspec
 import numpy as np
 
@@ -22,9 +20,10 @@ def _plain(value: object) -> object:
 _ENCODER = msgspec.msgpack.Encoder(order="deterministic", enc_hook=_plain)
 
 
-@cache
-def _decoder(subject: str) -> msgspec.msgpack.Decoder[Message]:
-    return msgspec.msgpack.Decoder(BY_SUBJECT[subject].message)
+# All built here, before any thread: two threads that build decoders of one struct at once crash msgspec 0.22.
+_DECODERS: dict[str, msgspec.msgpack.Decoder[Message]] = {
+    subject: msgspec.msgpack.Decoder(topic.message) for subject, topic in BY_SUBJECT.items()
+}
 
 
 def encode(message: Message) -> bytes:
@@ -37,6 +36,6 @@ def decode(subject: str, payload: bytes) -> Message:
     if len(payload) > MAX_MESSAGE_BYTES:
         raise WireError(f"{subject}: {len(payload)} bytes, more than {MAX_MESSAGE_BYTES}")
     try:
-        return _decoder(subject).decode(payload)
+        return _DECODERS[subject].decode(payload)
     except (msgspec.DecodeError, msgspec.ValidationError, ValueError, RecursionError) as error:
         raise WireError(f"{subject}: {error}") from error

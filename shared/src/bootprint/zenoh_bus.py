@@ -26,6 +26,8 @@ _MISS_HEARTBEAT_S = 0.5
 _RETRY_S = 0.2
 
 _Publisher = zenoh.Publisher | ext.AdvancedPublisher
+_Samples = zenoh.handlers.Handler[zenoh.Sample]
+_Subscriber = zenoh.Subscriber[_Samples] | ext.AdvancedSubscriber[_Samples]
 
 
 def _client_config(router: str) -> zenoh.Config:
@@ -92,7 +94,10 @@ def open_bus(
     ``lossless``: publishers wait instead of dropping and subscribers push back, for replay as fast as possible.
     """
     deadline = time.monotonic() + timeout_s
-    config = _client_config(router)
+    try:
+        config = _client_config(router)
+    except zenoh.ZError as error:
+        raise BusError(f"router {router!r} is no address; want one like tcp/127.0.0.1:7447") from error
     while True:
         try:
             return ZenohBus(zenoh.open(config), lossless=lossless)
@@ -168,21 +173,19 @@ class ZenohBus:
                 return
             handler(Envelope(address, message))
 
-        self._spawn(self._new_subscriber(selector), decoded)
+        self._spawn(self._new_subscriber, selector, decoded)
 
     def subscribe_raw(self, selector: str, handler: RawHandler) -> None:
         """Call ``handler(key, payload)`` from a thread with everything that matches, valid or not."""
-        self._spawn(self._session.declare_subscriber(selector, self._channel()), handler)
+        self._spawn(self._plain_subscriber, selector, handler)
 
-    def _new_subscriber(
-        self, selector: str
-    ) -> (
-        zenoh.Subscriber[zenoh.handlers.Handler[zenoh.Sample]]
-        | ext.AdvancedSubscriber[zenoh.handlers.Handler[zenoh.Sample]]
-    ):
+    def _plain_subscriber(self, selector: str) -> _Subscriber:
+        return self._session.declare_subscriber(selector, self._channel())
+
+    def _new_subscriber(self, selector: str) -> _Subscriber:
         topic = BY_SUBJECT.get(selector.split("/")[4]) if selector.count("/") == 5 else None
         if topic is None or topic.qos is Qos.STREAM:
-            return self._session.declare_subscriber(selector, self._channel())
+            return self._plain_subscriber(selector)
         return ext.declare_advanced_subscriber(
             self._session,
             selector,
@@ -198,12 +201,12 @@ class ZenohBus:
             return zenoh.handlers.FifoChannel(_CHANNEL_SIZE)
         return zenoh.handlers.RingChannel(_CHANNEL_SIZE)
 
-    def _spawn(
-        self,
-        subscriber: "zenoh.Subscriber[zenoh.handlers.Handler[zenoh.Sample]]"
-        " | ext.AdvancedSubscriber[zenoh.handlers.Handler[zenoh.Sample]]",
-        handler: RawHandler,
-    ) -> None:
+    def _spawn(self, declare: Callable[[str], _Subscriber], selector: str, handler: RawHandler) -> None:
+        try:
+            subscriber = declare(selector)
+        except zenoh.ZError as error:
+            raise BusError(f"{selector!r} is no selector of keys: {_first_line(error)}") from error
+
         def drain() -> None:
             for sample in subscriber.handler:
                 handler(str(sample.key_expr), sample.payload.to_bytes())
@@ -221,6 +224,10 @@ class ZenohBus:
         """The keys of the liveliness tokens that match (one query of the router)."""
         replies = self._session.liveliness().get(selector, timeout=1.0)
         return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
+
+    def is_connected(self) -> bool:
+        """Whether the router is there now; zenoh looks for it by itself when it is not."""
+        return bool(self._session.info.routers_zid())
 
     def close(self) -> None:
         """Close the session first, then join the threads that drained it; safe to call twice."""

@@ -1,73 +1,84 @@
-"""The page docs/figures.md: what `bootprint evaluate` finds on the recorded data, as Markdown.
+"""Makes docs/foot-ins.md and its pictures: what the foot INS finds on the recorded data, and what it costs.
 
-python -m proving_ground.evaluation.figures DATA > docs/figures.md
+python -m proving_ground.evaluation.figures DATA DOCS
 """
 
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from bootprint import logs
-from proving_ground.evaluation.evaluate import ALL, Row, evaluate_task, methods_of, plan, summaries
+from pdr_engine.foot import METHODS, FootSettings
+from proving_ground.evaluation.ablation import ABLATIONS, plain, rmse_of
+from proving_ground.evaluation.benchmark import measure, walk_of
+from proving_ground.evaluation.evaluate import FUSED, Evaluated, evaluate_task, plan
+from proving_ground.evaluation.foot_page import Findings, page
+from proving_ground.evaluation.foot_plots import save_shares, save_tracks
 from sensor_gateway.recordings import load_runs
+from sensor_gateway.recordings.run import Run
 
-_SETS = ("pyshoe-vicon", "foot-gcp", "xio-gait", "gaitmap-example", "dualfoot-fgo")
-_COLUMNS = (
-    ("rmse_m", "RMSE m", "{:.3f}"),
-    ("final_pct", "end %", "{:.2f}"),
-    ("distance_error_pct", "distance %", "{:+.2f}"),
-    ("height_final_m", "height m", "{:+.2f}"),
-    ("heading_drift_deg_per_min", "drift °/min", "{:+.2f}"),
-    ("inside_95_pct", "in 95 %", "{:.0f}"),
-    ("us_per_sample", "µs a sample", "{:.1f}"),
-)
-_HEAD = """# Figures on the recorded data
-
-Made by `make figures` (`bootprint evaluate` on each set); errors are horizontal, after a rigid fit of yaw and
-offset. The data sets are public recordings under the MIT licence: pyshoe-vicon by Wagstaff, Peretroukhin and Kelly
-(University of Toronto), foot-gcp by M. T. Koroglu, xio-gait by x-io Technologies, gaitmap-example by MaD Lab (FAU),
-dualfoot-fgo by Hu and Hu. Published by others on the same kinds of data: one fixed threshold 0.33 m (vicon) and
-3.3 m (gcp) mean RMSE, a trained LSTM detector 0.108 m and 1.91 m.
-"""
+SETS = ("pyshoe-vicon", "foot-gcp", "xio-gait", "gaitmap-example", "dualfoot-fgo")
+WALKED = SETS[:2]  # the sets with enough runs to compare methods and choices by
+DEFAULT = FootSettings().method
+_TURNS = 3
 
 
-def main(data: Path) -> None:
-    """Print the page for the sets that are in ``data``."""
+@dataclass(frozen=True, slots=True)
+class DataSet:
+    """One set: its runs, every foot by every method, and both feet fused by the default."""
+
+    name: str
+    runs: list[Run]
+    feet: list[Evaluated]
+    fused: list[Evaluated]
+
+    def by(self, method: str) -> list[Evaluated]:
+        """The feet of one method."""
+        return [evaluated for evaluated in self.feet if evaluated.task.method == method]
+
+    def errors_m(self, method: str) -> list[float]:
+        """The known 2-D RMSE of one method's feet."""
+        return [float(rmse) for e in self.by(method) if (rmse := e.row["rmse_m"]) is not None]
+
+
+def main(data: Path, docs: Path) -> None:
+    """Write the page for the sets that are in ``data``."""
     logs.configure("error")
-    out = sys.stdout.write
-    out(_HEAD)
-    for name in _SETS:
-        if (data / name).is_dir():
-            out(f"\n## {name}\n\n")
-            out(_methods_table(data / name) if name in _SETS[:2] else "")
-            out(_runs_table(_rows(data / name, None)))
+    images = docs / "img"
+    images.mkdir(parents=True, exist_ok=True)
+    sets = [evaluated_set(data / name) for name in SETS if (data / name).is_dir()]
+    walked = [one for one in sets if one.name in WALKED]
+    save_tracks([run for one in walked for run in middle_and_worst(one)], images / "foot-tracks.png")
+    shares = {one.name: {method: one.errors_m(method) for method in METHODS} for one in walked}
+    save_shares(shares, DEFAULT, images / "foot-shares.png")
+    findings = Findings(
+        rows={one.name: [evaluated.row for evaluated in one.feet] for one in sets},
+        runs={one.name: [evaluated.row for evaluated in one.by(DEFAULT) + one.fused] for one in sets},
+        plain={one.name: {method: rmse_of(plain(method), one.runs) for method in METHODS} for one in walked},
+        ablation={
+            one.name: {variant.name: rmse_of(variant, one.runs) for variant in ABLATIONS} for one in walked
+        },
+        cost=measure(walk_of(None), _TURNS),
+    )
+    (docs / "foot-ins.md").write_text(page(findings), encoding="utf-8")
 
 
-def _rows(path: Path, method: str | None) -> list[Row]:
-    return [evaluate_task(task, "best-fit").row for task in plan(load_runs([path]), None, methods_of(method))]
+def evaluated_set(path: Path) -> DataSet:
+    """Every foot of a set by every method; both feet together by the default."""
+    runs = load_runs([path])
+    feet = [evaluate_task(task, "best-fit") for task in plan(runs, "foot", METHODS)]
+    dual = [run for run in runs if run.kind == "dual"]
+    together = [task for task in plan(dual, None, [DEFAULT]) if task.place == FUSED] if dual else []
+    return DataSet(path.name, runs, feet, [evaluate_task(task, "best-fit") for task in together])
 
 
-def _methods_table(path: Path) -> str:
-    """RMSE by method: median, mean and worst over the set's runs."""
-    lines = ["| method | n | median m | mean m | worst m |", "|---|---|---|---|---|"]
-    for row in summaries(_rows(path, ALL)):
-        figures = " | ".join(_cell(row[f"rmse_m_{name}"], "{:.3f}") for name in ("median", "mean", "worst"))
-        lines.append(f"| {row['method']} | {row['n']} | {figures} |")
-    return "\n".join(lines) + "\n\n"
-
-
-def _runs_table(rows: Sequence[Row]) -> str:
-    titles = " | ".join(title for _, title, _ in _COLUMNS)
-    lines = [f"| run | {titles} |", "|---|" + "---|" * len(_COLUMNS)]
-    for row in rows:
-        cells = " | ".join(_cell(row[name], form) for name, _, form in _COLUMNS)
-        lines.append(f"| {row['run']} | {cells} |")
-    return "\n".join(lines) + "\n"
-
-
-def _cell(value: float | int | str | None, form: str) -> str:
-    return "–" if value is None else form.format(value)
+def middle_and_worst(one: DataSet) -> Sequence[Evaluated]:
+    """The default's run of median error, and its worst."""
+    known = [evaluated for evaluated in one.by(DEFAULT) if evaluated.row["rmse_m"] is not None]
+    ordered = sorted(known, key=lambda evaluated: float(evaluated.row["rmse_m"] or 0.0))
+    return (ordered[(len(ordered) - 1) // 2], ordered[-1])
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

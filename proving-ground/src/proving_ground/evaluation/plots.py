@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 TRUTH, ESTIMATE, ERROR, MUTED = "#5b6770", "#d1495b", "#2e6f95", "#c8ced3"
 _FIGURE_IN, _DPI = (11.0, 5.2), 130
-_STYLE: dict[str, Any] = {
+STYLE: dict[str, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.edgecolor": MUTED,
@@ -37,7 +37,7 @@ def save_plot(evaluated: Evaluated, folder: Path) -> Path:
     from matplotlib import pyplot as plt
 
     path = folder / f"{_file_name(evaluated)}.png"
-    with plt.style.context(_STYLE):
+    with plt.style.context(STYLE):
         figure, (map_axes, error_axes) = plt.subplots(
             1, 2, figsize=_FIGURE_IN, layout="constrained", width_ratios=(1.25, 1.0)
         )

@@ -1,8 +1,6 @@
 """`bootprint demo`: four soldiers, six computers, eighteen processes, two radio nets, one picture; then a score."""
 
-import json
 import math
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from bootprint.commands.options import write_json
 from bootprint.errors import ConfigError
 from bootprint.stopping import Stop
 
@@ -58,25 +57,43 @@ def demo(
     Example: bootprint demo --data recordings --speed 5
     """
     _check(speed, loss, duration)
+    _check_outputs(report, json_out)
     from proving_ground.exercises.exercise import recorded_exercise, simulated_exercise
+    from proving_ground.exercises.processes import ProcessError
     from proving_ground.exercises.report import print_scores, write_report
     from proving_ground.exercises.result import result_of
     from proving_ground.exercises.stage import Play, Stage
 
     exercise = recorded_exercise(data) if data else simulated_exercise(report / "walks", seed)
     length_s = exercise.duration_s + _SETTLE_S if duration is None else duration
+    fault: ProcessError | None = None
     with Stop() as stop, Stage(exercise, Play(report, speed, loss)) as stage:
-        Runner(stage, length_s, stop, headless=headless).run()
+        try:
+            Runner(stage, length_s, stop, headless=headless).run()
+        except ProcessError as error:  # what was played until then is scored all the same
+            fault = error
         result = result_of(stage)
     write_report(report, exercise, result)
-    if json_out == "-":
-        sys.stdout.write(json.dumps(result.figures, indent=2) + "\n")
-    else:
+    if json_out != "-":
         print_scores(result)
-    if json_out not in (None, "-"):
-        Path(str(json_out)).write_text(json.dumps(result.figures, indent=2) + "\n", encoding="utf-8")
+    if json_out is not None:
+        write_json(result.figures, json_out)
+    if fault is not None:
+        raise fault
     if stop.is_set():
         raise typer.Exit(_EXIT_INTERRUPTED)
+
+
+def _check_outputs(report: Path, json_out: str | None) -> None:
+    """ConfigError now, rather than after the whole exercise, if its results cannot be written."""
+    targets = [report / "result.json", *([Path(json_out)] if json_out not in (None, "-") else [])]
+    try:
+        report.mkdir(parents=True, exist_ok=True)
+        for target in targets:
+            with target.open("a", encoding="utf-8"):
+                pass
+    except OSError as error:
+        raise ConfigError(f"{error.filename}: cannot be written: {error.strerror}") from error
 
 
 def _check(speed: float, loss: float, duration: float | None) -> None:
@@ -108,7 +125,7 @@ class Runner:
             return
         self.stage.start_walks(self.stop)
         console.print(f"{len(self.stage.processes.pids)} processes run, walks begin")
-        if self.headless:
+        if self.headless or not console.is_terminal:
             self._lines(console)
         else:
             self._live(console)

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from bootprint.config import Origin
 from bootprint.errors import RecordingError
 from proving_ground.simulation.run_writer import write_run_folder
@@ -36,11 +34,6 @@ class Soldier:
     truth: Truth
     start: dict[str, float]
     simulated: bool
-
-    @property
-    def distance_m(self) -> float:
-        """Length of the true track, horizontally."""
-        return float(np.linalg.norm(np.diff(self.truth.position_m[:, :2], axis=0), axis=1).sum())
 
     @property
     def sources(self) -> list[str]:

@@ -58,7 +58,7 @@ class ProcessGroup:
     def failed(self) -> list[str]:
         """One line for each process that ended with an error: its name, exit code and last words."""
         return [
-            f"{name} ended with exit code {process.returncode}: {_last_line(spec.log)}"
+            f"{name} {_end_of(process.returncode)}; its last words in {spec.log}: {_last_line(spec.log)}"
             for name, (spec, process) in self._running.items()
             if process.poll() not in (None, 0)
         ]
@@ -103,6 +103,10 @@ def _all_ended(processes: list[subprocess.Popen[bytes]], within_s: float) -> boo
         except subprocess.TimeoutExpired:
             return False
     return True
+
+
+def _end_of(code: int) -> str:
+    return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
 
 
 def _find(command: str) -> str:

@@ -19,6 +19,7 @@ _TABLES = (
     ("links", "Radio links, link headers included"),
 )
 _UNITS = {"_bits_per_s": "bit/s", "bits_per_s": "bit/s", "_m": "m", "_s": "s", "_pct": "%", "_ms": "ms"}
+_FILE_WIDTH = 160
 _STYLE = """
 body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem}
 body{color:#1b1f23;background:#fff}
@@ -32,6 +33,8 @@ img{max-width:100%}
 def print_scores(result: Result) -> None:
     """The score tables on standard output."""
     console = Console()
+    if not console.is_terminal:
+        console.width = _FILE_WIDTH  # a file or a pipe has no columns to save
     for key, title in _TABLES:
         rows = result.figures[key]
         table = Table(title=title, title_justify="left")
@@ -103,6 +106,10 @@ def _map(result: Result) -> str:
         truth, fused = compared.soldier.truth.position_m, compared.to_truth(compared.track.enu_m[:, :2])
         axis.plot(truth[:, 0], truth[:, 1], color="#9aa4ae", linewidth=3, label="truth")
         axis.plot(fused[:, 0], fused[:, 1], color="#0b6bcb", linewidth=1.2, label="fused")
+        told = compared.to_truth(result.reports_m[name])
+        axis.plot(
+            told[:, 0], told[:, 1], "x", color="#e36209", markersize=5, label="told to the command post"
+        )
         axis.plot(*fused[0], "o", color="#1a7f37", label="start")
         axis.plot(*fused[-1], "s", color="#cf222e", label="end")
         axis.set(

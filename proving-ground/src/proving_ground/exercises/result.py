@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING, Any
 from proving_ground.exercises.exercise import COMMAND_POST, Exercise
 from proving_ground.exercises.score import (
     Compared,
+    FloatArray,
     Row,
     compare,
     latency_p99_ms,
     link_row,
     picture_row,
+    reported_places,
     sample_picture,
     soldier_row,
 )
@@ -21,10 +23,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Result:
-    """``figures`` is what ``result.json`` holds; ``compared`` feeds the report's map."""
+    """``figures`` is what ``result.json`` holds; ``compared`` and ``reports_m`` feed the report's map.
+
+    ``reports_m``: the places (n, 2) at which the command post was told each soldier to be.
+    """
 
     figures: dict[str, Any]
     compared: dict[str, Compared]
+    reports_m: dict[str, FloatArray]
 
 
 def result_of(stage: "Stage") -> Result:
@@ -63,6 +69,7 @@ def result_of(stage: "Stage") -> Result:
             "latency_p99_ms": latency_p99_ms(list(heard.values())),
         },
         compared=squad,
+        reports_m={name: reported_places(heard[COMMAND_POST].tracks, name, stage.frame) for name in squad},
     )
 
 

@@ -95,13 +95,17 @@ def compare(soldier: Soldier, positions: Sequence[Position], start_ns: int) -> C
 
 
 def soldier_row(soldier: Soldier, compared: Compared | None) -> Row:
-    """One row of ``soldiers`` (DESIGN's figures); figures are None when nothing could be compared."""
-    row: Row = {"soldier": soldier.id, "distance_m": soldier.distance_m}
+    """One row of ``soldiers``; figures are None when nothing could be compared.
+
+    ``distance_m`` is the truth's path over the time that was compared.
+    """
+    row: Row = {"soldier": soldier.id, "distance_m": None}
     if compared is None:
         names = ("position_error_p50_m", "position_error_p95_m", "final_error_m", "height_error_p95_m")
         return row | dict.fromkeys((*names, "inside_95_pct", "floor_correct_pct"))
     error_m = np.linalg.norm(compared.errors_m, axis=1)
     return row | {
+        "distance_m": float(np.linalg.norm(np.diff(compared.truth_m[:, :2], axis=0), axis=1).sum()),
         "position_error_p50_m": float(np.percentile(error_m, 50)),
         "position_error_p95_m": float(np.percentile(error_m, 95)),
         "final_error_m": float(error_m[-1]),
@@ -198,6 +202,12 @@ def _sample_soldier(
         np.linalg.norm(believed_m - fused_m, axis=1),
         age_s,
     )
+
+
+def reported_places(tracks: Sequence[tuple[int, Track]], soldier: str, frame: LocalFrame) -> FloatArray:
+    """Where a receiver was told a soldier to be, ENU (n, 2)."""
+    places = [_horizontal(track, frame) for _, track in tracks if track.soldier == soldier]
+    return np.array(places, dtype=np.float64).reshape(-1, 2)
 
 
 def _horizontal(track: Track, frame: LocalFrame) -> tuple[float, float]:

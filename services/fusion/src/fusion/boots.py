@@ -12,7 +12,7 @@ import numpy as np
 
 from bootprint.messages import FootPose, FootStep, MotionClass, Vector3
 from fusion.config import FusionConfig
-from fusion.feet import Foot
+from fusion.feet import Entry, Foot
 from fusion.filter import Innovation, Measurement, StateFilter
 from fusion.joining import Joining, relative_noise
 from fusion.models import body, dual_foot, foot_step
@@ -22,6 +22,8 @@ from fusion.transform import RigidTransform
 
 _COARSE_STEP = np.diag([0.1, 0.1, 0.1, 0.05]) ** 2  # for a step whose covariance is none
 _MOVING_M = 0.1  # a shorter step is standing
+_SHORTEST_S, _LONGEST_S = 0.25, 60.0  # of a step, for what speed says of its length
+_LONGEST_SWING_S = 10.0  # no stance in that time: where the foot is is anybody's guess
 _TOGETHER_NS = 2_000_000_000  # feet whose first steps are this near set off together
 
 
@@ -43,12 +45,12 @@ class Boots:
         """Take a step into account; the foot if the step moved it within the filter."""
         foot = self.feet[place]
         newer = foot.end_ns is None or step.time_ns > foot.end_ns
-        lost = foot.ledger.enter(step.sequence, newer)
-        if lost is None:
+        entry = foot.ledger.enter(step.sequence, newer)
+        if entry is None:
             self._counters["duplicate_steps"] += 1
             return None
         self._begin(foot, step)
-        self._own_up(foot, step, lost)
+        self._own_up(foot, step, entry)
         moved = self._compose(foot, step, newer)
         foot.end_ns = step.time_ns if newer else foot.end_ns
         foot.hear(step.time_ns)
@@ -57,7 +59,9 @@ class Boots:
     def pose(self, place: str, pose: FootPose) -> None:
         """Take where a foot is between two steps."""
         foot = self.feet[place]
-        if not foot.note_pose(pose):
+        if math.hypot(*pose.displacement_m) > self._config.boots.max_speed_m_s * _LONGEST_SWING_S:
+            self._counters["implausible_poses"] += 1
+        elif not foot.note_pose(pose):
             self._counters["poses_without_step"] += 1
         elif foot.active:
             self._sample(foot, pose.time_ns)
@@ -70,11 +74,12 @@ class Boots:
             self._began_ns = step.start_time_ns
             self._sample(foot, step.start_time_ns)
 
-    def _own_up(self, foot: Foot, step: FootStep, lost: int) -> None:
+    def _own_up(self, foot: Foot, step: FootStep, entry: Entry) -> None:
         """Widen the covariance by what happened to this foot unseen; drop it if the other one saw more."""
         silence = self._config.silence
-        untracked_s = foot.untracked_s(step, lost)
-        self._counters["lost_steps"] += lost
+        untracked_s = foot.untracked_s(step, entry.unseen)
+        self._counters["lost_steps"] += entry.lost
+        self._counters["foot_restarts"] += entry.anew
         if untracked_s > silence.rejoin_s and self._others(foot, step.time_ns):
             self._drop(foot)
         elif foot.active and untracked_s > 0.0:
@@ -102,10 +107,11 @@ class Boots:
 
     def _compose(self, foot: Foot, step: FootStep, newer: bool) -> bool:
         duration_s = (step.time_ns - step.start_time_ns) / 1e9
-        if math.hypot(*step.displacement_m) > self._config.boots.max_speed_m_s * max(duration_s, 0.25):
+        plausible_s = min(max(duration_s, _SHORTEST_S), _LONGEST_S)
+        if math.hypot(*step.displacement_m) > self._config.boots.max_speed_m_s * plausible_s:
             self._counters["implausible_steps"] += 1
             if foot.active:
-                self._widen(foot, (self._config.silence.drift_m_s * max(duration_s, 0.5)) ** 2, 0.0)
+                self._widen(foot, (self._config.silence.drift_m_s * max(plausible_s, 0.5)) ** 2, 0.0)
             return False
         covariance = foot_step.step_covariance(step.covariance)
         if covariance is None:
@@ -216,6 +222,12 @@ class Boots:
             if foot.joining is not None:
                 foot.joining.relocate(transform)
 
+    def shift(self, by_ns: int) -> None:
+        """The clock has been set: what was remembered by the old one."""
+        self._began_ns += by_ns
+        for foot in self.feet.values():
+            foot.shift(by_ns)
+
     # --- what is asked -----------------------------------------------------------------------------------------
 
     def alive(self, now_ns: int) -> list[Foot]:
@@ -239,6 +251,14 @@ class Boots:
 
     def _point(self, foot: Foot) -> Vector3:
         return _xyz(body.foot_position(self.filter.state, (foot.block, foot.offset)))
+
+    def moved_since(self, time_ns: int) -> Array | None:
+        """How far the body went since then, by its feet, (3,) m; None if that is not remembered."""
+        moves = [foot.moved_since(time_ns) for foot in self.alive(time_ns)]
+        known = [move for move in moves if move is not None]
+        if len(known) < len(moves):
+            return None
+        return np.mean(known, axis=0) if known else np.zeros(3)
 
     def velocity(self, foot: Foot) -> Vector3:
         """Mean velocity of a foot over its last stride, m/s."""

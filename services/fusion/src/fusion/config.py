@@ -18,6 +18,7 @@ import msgspec
 
 from bootprint.config import Config
 from bootprint.messages import Latitude, Longitude
+from bootprint.topics import check_part
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
@@ -26,7 +27,10 @@ Feet = Annotated[tuple[str, ...], msgspec.Meta(min_length=1, max_length=2)]
 
 
 class StartConfig(Config, frozen=True):
-    """A known point where the soldier is when the first message comes (``[fusion.start]``).
+    """A known point where the soldier is when the boots make their first step (``[fusion.start]``).
+
+    It holds at the very first step of the pdr-engine (sequence 0) only: whoever is restarted in the middle of a
+    walk does not claim to be back at the door.
 
     Give ``east_m`` and ``north_m``, or ``latitude_deg`` and ``longitude_deg``. ``azimuth_deg`` (clockwise from
     true north) is the direction the soldier *walks off in*; without it the heading stays unknown until
@@ -61,7 +65,11 @@ class GnssConfig(Config, frozen=True):
     fresh_s: Positive = 5.0  # mode "gnss" for this long after an accepted fix
     placement_accuracy_m: Positive = 15.0  # only fixes this good may place a soldier
     placement_heading_sigma_deg: Positive = 8.0  # heading is known when the fit of tracks is this sure
-    max_range_km: Positive = 200.0  # further from the realm's origin a fix is nonsense
+    max_range_km: Positive = 200.0  # further from the realm's origin, or less accurate, a fix is nonsense
+    late_s: NonNegative = (
+        3.0  # a fix that comes later than its turn by up to this is carried along by the feet
+    )
+    late_sigma_m_s: NonNegative = 0.3  # what that adds to its sigma: heading errors, and stamps a little off
 
 
 class AlignConfig(Config, frozen=True):
@@ -102,7 +110,7 @@ class FusionConfig(Config, frozen=True):
     """``[fusion]``: everything the fusion service can be told."""
 
     feet: Feet = ("left_foot", "right_foot")
-    gnss_sources: tuple[str, ...] = ("gnss",)  # receivers waited for; fixes of others count if in time
+    gnss_sources: tuple[str, ...] = ("gnss",)  # receivers waited for, within the window
     reorder_window_s: NonNegative = 0.3  # the longest wait for what is out of order
     stance_delay_s: NonNegative = 0.1  # a FootStep is stamped at most this long before poses already sent
     rate_hz: Annotated[float, msgspec.Meta(ge=1.0, le=20.0)] = 5.0
@@ -118,3 +126,5 @@ class FusionConfig(Config, frozen=True):
     def __post_init__(self) -> None:
         if len(set(self.feet)) != len(self.feet):
             raise ValueError(f"feet names {self.feet[0]!r} twice")
+        for name in (*self.feet, *self.gnss_sources):
+            check_part("a name in feet or gnss_sources", name)

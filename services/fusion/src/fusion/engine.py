@@ -4,11 +4,12 @@ What comes too late to be put in order follows one rule a kind, and is counted:
 
 - a **FootStep** still happened: it is composed at once, onto what the foot has become meanwhile;
 - a **Fix** is a person's word: it is taken at once, the less sure by what may have been walked since;
-- a **FootPose** or **GnssFix** is dropped: the next one comes soon.
+- a **GnssFix** is carried along by what the feet have walked since, if that is remembered, else dropped;
+- a **FootPose** is dropped: the next one comes soon.
 
 A position at t is published when everything up to t + ``lookahead_s`` has been taken in, so that it lies between
 two foot poses instead of up to a tenth of a second behind. So it depends on the messages alone, not on when ticks
-come.
+come. A ``patient`` core (replay as fast as possible) waits for everybody, whatever ticks say, to its close.
 """
 
 from collections import Counter
@@ -18,11 +19,12 @@ from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.config import Origin
 from bootprint.figures import Figures
-from bootprint.messages import Fix, FootPose, FootStep, GnssFix, Message
+from bootprint.messages import Fix, FootPose, FootStep, GnssFix, Message, Mode
 from bootprint.topics import Address, Identity
 from fusion.config import FusionConfig
 from fusion.estimator import Estimator
 from fusion.output import Publisher, horizontal_sigma_m
+from fusion.pulse import LivePulse, ReplayPulse
 from fusion.reorder import Arrival, Promise, ReorderBuffer, Waiting
 
 SUBJECTS = ("foot_step", "foot_pose", "gnss", "fix")  # at one time in this order: a step before its own poses
@@ -33,13 +35,15 @@ _LONGEST_LEAP_NS = 60 * NS_PER_S  # after a longer hole in time the positions be
 class FusionCore:
     """One soldier's fusion; pure: the same messages give the same positions."""
 
-    def __init__(self, config: FusionConfig, identity: Identity, origin: Origin) -> None:
+    def __init__(
+        self, config: FusionConfig, identity: Identity, origin: Origin, *, patient: bool = False
+    ) -> None:
         self.counters: Counter[str] = Counter()
         self.estimator = Estimator(config, origin, self.counters)
         self._config = config
         self._address = identity.address("position", SOURCE)
         self._publisher = Publisher(origin, config.floor_height_m)
-        self._buffer = _buffer(config)
+        self._buffer = _buffer(config, patient)
         self._period_ns = round(NS_PER_S / config.rate_hz)
         self._lookahead_ns = round(config.lookahead_s * NS_PER_S)
         self._stance_delay_ns = round(config.stance_delay_s * NS_PER_S)
@@ -64,7 +68,10 @@ class FusionCore:
             self._late(source, message)
         elif arrival is not Arrival.QUEUED:
             self.counters[arrival.value] += 1
-        return list(self._drain())
+        if arrival is Arrival.IMPLAUSIBLE and address.subject == "gnss":
+            self.estimator.satellites.note_stamp(usable=False)
+        set_back_ns = self._buffer.set_back_ns
+        return list(self._drain() if set_back_ns is None else self._follow_back(set_back_ns))
 
     def tick(self, now_ns: int) -> Iterable[Envelope]:
         """Event time is ``now_ns``: positions that silent boots have held back for long enough."""
@@ -80,14 +87,26 @@ class FusionCore:
         """Counters, and how sure the position is now."""
         gauges = {
             "waiting": float(len(self._buffer)),
+            "evicted": float(self._buffer.evicted),
             "gnss_nis": self.estimator.satellites.normalised_squared,
         }
         if self._next_ns is None:
             return Figures("starting", dict(self.counters), gauges, "no input yet")
         estimate = self.estimator.estimate(self._next_ns - self._period_ns)
         gauges["sigma_m"] = horizontal_sigma_m(estimate.covariance)
-        degraded = estimate.mode in ("unplaced", "coasting", "lost")
-        return Figures("degraded" if degraded else "ok", dict(self.counters), gauges, estimate.mode)
+        complaints = self._complaints(estimate.mode)
+        degraded = bool(complaints) or estimate.mode in ("unplaced", "coasting", "lost")
+        note = "; ".join((estimate.mode, *complaints))
+        return Figures("degraded" if degraded else "ok", dict(self.counters), gauges, note)
+
+    def _complaints(self, mode: Mode) -> list[str]:
+        """What somebody should look after, in words."""
+        words = []
+        if self.estimator.satellites.is_mistimed:
+            words.append("most satellite fixes are stamped too late or too far ahead")
+        if mode == "unplaced" and self.counters["start_refused"]:
+            words.append("joined a walk under way: start not taken, waiting for satellites or a fix")
+        return words
 
     # --- in ----------------------------------------------------------------------------------------------------
 
@@ -104,10 +123,13 @@ class FusionCore:
     def _late(self, source: str, message: Message) -> None:
         _, subject, name = source.split("/", 2)
         self.counters[f"late_{subject}"] += 1
+        late_s = (self._buffer.low_ns - message.time_ns) / NS_PER_S
         if subject == "foot_step":
             self._step(name, message)
         elif isinstance(message, Fix):
-            self.estimator.fix(message, late_s=(self._buffer.low_ns - message.time_ns) / NS_PER_S)
+            self.estimator.fix(message, late_s)
+        elif isinstance(message, GnssFix):
+            self.estimator.gnss(name, message, late_s)
 
     def _step(self, name: str, message: Message) -> None:
         if isinstance(message, FootStep):
@@ -149,9 +171,18 @@ class FusionCore:
             self._next_ns = (before_ns - _LONGEST_LEAP_NS) // self._period_ns * self._period_ns
             self.counters["leaps"] += 1
         while self._next_ns < before_ns:
-            estimate = self.estimator.estimate(self._next_ns)
-            yield Envelope(self._address, self._publisher.position(self._next_ns, estimate))
-            self._next_ns += self._period_ns
+            time_ns = self._next_ns
+            self._next_ns += self._period_ns  # first, so that no error can hold time at this position
+            yield Envelope(self._address, self._publisher.position(time_ns, self.estimator.estimate(time_ns)))
+
+    def _follow_back(self, time_ns: int) -> Iterator[Envelope]:
+        """The boots' clock has been set back: finish the old time, and go on with everything in the new."""
+        self.counters["clock_set_back"] += 1
+        self._buffer.flush()
+        yield from self._drain()
+        self.estimator.shift(self._buffer.restart(time_ns))
+        self._next_ns = None
+        yield from self._drain()
 
 
 def _source(subject: str, name: str) -> str:
@@ -159,13 +190,13 @@ def _source(subject: str, name: str) -> str:
     return f"{SUBJECTS.index(subject)}/{subject}/{name}"
 
 
-def _buffer(config: FusionConfig) -> ReorderBuffer:
+def _buffer(config: FusionConfig, patient: bool) -> ReorderBuffer:
     """The reorder buffer: the feet drive time, receivers are waited for."""
-    feet = {_source(subject, place) for subject in ("foot_step", "foot_pose") for place in config.feet}
-    receivers = {_source("gnss", source) for source in config.gnss_sources}
-    return ReorderBuffer(
-        window_ns=round(config.reorder_window_s * NS_PER_S),
-        drivers=frozenset(feet),
-        expected=frozenset(feet | receivers),
-        patience_ns=round(config.silence.patience_s * NS_PER_S),
+    feet = frozenset(
+        _source(subject, place) for subject in ("foot_step", "foot_pose") for place in config.feet
     )
+    expected = feet | {_source("gnss", source) for source in config.gnss_sources}
+    if patient:
+        return ReorderBuffer(ReplayPulse(feet), expected, capacity=None)
+    window_ns = round(config.reorder_window_s * NS_PER_S)
+    return ReorderBuffer(LivePulse(feet, window_ns, round(config.silence.patience_s * NS_PER_S)), expected)

@@ -20,7 +20,7 @@ from fusion.feet import Foot
 from fusion.filter import Innovation, Measurement
 from fusion.models import body, gnss
 from fusion.output import Estimate, horizontal_sigma_m
-from fusion.placement import UNKNOWN_UP_SIGMA_M, HeadingHint, Place, Placement
+from fusion.placement import UNKNOWN_UP_SIGMA_M, HeadingHint, Place, Placement, known_point
 from fusion.satellites import SatellitePosition, Satellites
 from fusion.state import Array
 
@@ -41,21 +41,23 @@ class Estimator:
         self._hint: HeadingHint | None = None  # a direction to walk off in, given when already placed
         self._coasted_m2 = 0.0  # variance already added to the state in this silence
         self._begun_ns = 0
+        self._start = config.start  # until the first step
 
     # --- what comes in -----------------------------------------------------------------------------------------
 
     def begin(self, time_ns: int) -> None:
-        """The first message has this stamp: here the configured start holds."""
+        """The first message has this stamp."""
         self._begun_ns = time_ns
-        start = self._config.start
+
+    def _take_start(self, first: FootStep) -> None:
+        """The configured start holds where the boots begin; who joins a walk that is under way is elsewhere."""
+        start, self._start = self._start, None
         if start is None:
             return
-        if start.latitude_deg is not None and start.longitude_deg is not None:
-            height_m = self._frame.origin.height_m + start.up_m
-            east, north, _ = self._frame.to_enu(start.latitude_deg, start.longitude_deg, height_m)
-        else:
-            east, north = start.east_m or 0.0, start.north_m or 0.0
-        place = Place(time_ns, (east, north, start.up_m), start.sigma_m, start.up_sigma_m, (0.0, 0.0, 0.0))
+        if first.sequence != 0:
+            self._counters["start_refused"] += 1
+            return
+        place = known_point(start, self._frame, first.time_ns)
         self.placement.observe(place)
         if start.azimuth_deg is not None:
             yaw = yaw_of_azimuth(math.radians(start.azimuth_deg))
@@ -63,6 +65,7 @@ class Estimator:
 
     def step(self, place: str, step: FootStep) -> None:
         """A foot has made a step."""
+        self._take_start(step)
         foot = self.boots.step(place, step)
         if foot is None:
             return
@@ -83,28 +86,42 @@ class Estimator:
         self.boots.pose(place, pose)
         self._coasted_m2 = 0.0
 
-    def gnss(self, source: str, fix: GnssFix) -> None:
-        """A receiver has a solution."""
+    def gnss(self, source: str, fix: GnssFix, late_s: float = 0.0) -> None:
+        """A receiver has a solution; one that comes late is carried along by the feet, if they remember."""
+        moved = np.zeros(3) if late_s <= 0.0 else self._moved_within(late_s, fix.time_ns)
+        self.satellites.note_stamp(usable=moved is not None)
+        if moved is None:
+            self._counters["gnss_too_late"] += 1
+            return
         position = self.satellites.screen(source, fix)
         if position is None:
             return
+        if late_s > 0.0:
+            position = self.satellites.late(position, _xyz(moved) if self.placed else (0.0, 0.0, 0.0), late_s)
         if self.placed:
             self._correct_by(position)
         elif position.sigma_m > self._config.gnss.placement_accuracy_m:
             self._counters["gnss_too_coarse_to_place"] += 1
         else:
             self.satellites.placed_by(position)
-            local = self.boots.track_point()
+            local = _xyz(np.array(self.boots.track_point()) - moved)
             self.placement.observe(
                 Place(fix.time_ns, position.enu, position.sigma_m, position.up_sigma_m, local, source)
             )
             self._try_placing()
 
+    def _moved_within(self, late_s: float, since_ns: int) -> Array | None:
+        return self.boots.moved_since(since_ns) if late_s <= self._config.gnss.late_s else None
+
     def fix(self, fix: Fix, late_s: float = 0.0) -> None:
         """A person says where the soldier is; one that comes late is the less sure by what may have been walked."""
         height_m = self._frame.origin.height_m if fix.height_m is None else fix.height_m
         enu = self._frame.to_enu(fix.latitude_deg, fix.longitude_deg, height_m)
-        sigma_m = math.hypot(max(fix.accuracy_m, 0.1), self._config.silence.drift_m_s * late_s)
+        if not self.satellites.is_in_range(enu):
+            self._counters["fixes_out_of_range"] += 1
+            return
+        accuracy_m = min(max(fix.accuracy_m, 0.1), 1000.0 * self._config.gnss.max_range_km)
+        sigma_m = math.hypot(accuracy_m, self._config.silence.drift_m_s * late_s)
         up_sigma_m = None if fix.height_m is None else sigma_m
         place = Place(fix.time_ns, enu, sigma_m, up_sigma_m, self.boots.track_point())
         self._counters["fixes"] += 1
@@ -192,6 +209,12 @@ class Estimator:
         if silent_s is None or silent_s <= silence.coasting_s:
             return 0.0
         return (silence.drift_m_s * silent_s) ** 2
+
+    def shift(self, by_ns: int) -> None:
+        """The boots' clock has been set: all that was remembered by the old one moves along."""
+        self._begun_ns += by_ns
+        for part in (self.boots, self.satellites, self.placement):
+            part.shift(by_ns)
 
     # --- what is asked -----------------------------------------------------------------------------------------
 

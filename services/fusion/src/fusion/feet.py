@@ -13,9 +13,22 @@ from fusion.joining import Joining
 from fusion.state import Array, FootBlock
 
 _MOST_MISSING = 1000
-_SAMPLES = 8
+_SAMPLES = 64  # of poses and steps: about five seconds
 _GAP_S = 1.0  # between one step's end and the next one's start: more is time nobody saw
 _LONGEST_GAP_S = 60.0  # after this nothing is known anyway
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A step that is new: how many were lost just before it (bounded), or whether its sender began anew."""
+
+    lost: int = 0
+    anew: bool = False
+
+    @property
+    def unseen(self) -> int:
+        """Steps that at least were not seen: those lost, or what fell into the restart."""
+        return max(self.lost, int(self.anew))
 
 
 @dataclass(slots=True)
@@ -25,28 +38,32 @@ class StepLedger:
     last: int | None = None
     missing: set[int] = field(default_factory=set)
 
-    def enter(self, sequence: int, newer: bool) -> int | None:
-        """Enter a step; how many were lost just before it, or None if it is a duplicate.
+    def enter(self, sequence: int, newer: bool) -> Entry | None:
+        """Enter a step; None if it is a duplicate.
 
         A number that goes back on a ``newer`` step (later than the last) means that the sender began anew.
         """
         if self.last is None or sequence == self.last + 1:
             self.last = sequence
-            return 0
+            return Entry()
         if sequence > self.last:
-            lost = sequence - self.last - 1
-            self.missing.update(range(max(self.last + 1, sequence - _MOST_MISSING), sequence))
+            return self._skip_to(sequence)
+        if newer:
+            self.missing.clear()
             self.last = sequence
-            return lost
+            return Entry(anew=True)
         if sequence in self.missing:
             self.missing.remove(sequence)
-            return 0
-        return self._begin_anew(sequence) if newer else None
+            return Entry()
+        return None
 
-    def _begin_anew(self, sequence: int) -> int:
-        self.missing.clear()
+    def _skip_to(self, sequence: int) -> Entry:
+        """So many missing at once, and in all, are remembered and counted; more is a number that is wrong."""
+        assert self.last is not None
+        skipped = range(max(self.last + 1, sequence - _MOST_MISSING), sequence)
+        self.missing = set(sorted(self.missing.union(skipped))[-_MOST_MISSING:])
         self.last = sequence
-        return 1  # at least what fell into the restart
+        return Entry(lost=len(skipped))
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,16 +112,16 @@ class Foot:
         """Whether a message of this foot is not older than ``within_s``."""
         return self.heard_ns is not None and now_ns - self.heard_ns <= within_s * NS_PER_S
 
-    def untracked_s(self, step: FootStep, lost: int) -> float:
-        """How long this foot went unobserved up to the end of ``step``; half a second a lost step at least.
+    def untracked_s(self, step: FootStep, unseen: int) -> float:
+        """How long this foot went unobserved up to the end of ``step``; half a second an unseen step at least.
 
         A realigned step had its stream broken within and does not tell the whole way.
         """
         gap_s = 0.0 if self.end_ns is None else (step.start_time_ns - self.end_ns) / NS_PER_S
         broken_s = max(0.0, (step.time_ns - step.start_time_ns) / NS_PER_S) if step.realigned else 0.0
-        if lost == 0 and gap_s < _GAP_S:
+        if unseen == 0 and gap_s < _GAP_S:
             return min(broken_s, _LONGEST_GAP_S)
-        return min(broken_s + max(gap_s, 0.5 * lost), _LONGEST_GAP_S)
+        return min(broken_s + max(gap_s, 0.5 * unseen), _LONGEST_GAP_S)
 
     def note_step(self, step: FootStep, lateral_sigma_m: float) -> None:
         """This step has been composed."""
@@ -133,6 +150,21 @@ class Foot:
                 return _between(before, sample, time_ns)
             before = sample
         return before[1]
+
+    def moved_since(self, time_ns: int) -> Array | None:
+        """How far the foot went since then, (3,) m; None if that is not remembered."""
+        if not self.samples or time_ns < self.samples[0][0]:
+            return None
+        moved: Array = self.samples[-1][1] - self.at(time_ns)
+        return moved
+
+    def shift(self, by_ns: int) -> None:
+        """The clock has been set: what was remembered by the old one."""
+        self.end_ns = None if self.end_ns is None else self.end_ns + by_ns
+        self.heard_ns = None if self.heard_ns is None else self.heard_ns + by_ns
+        moved = [(time_ns + by_ns, point) for time_ns, point in self.samples]
+        self.samples.clear()
+        self.samples.extend(moved)
 
     def relocate(self, to: Callable[[Array], Array]) -> None:
         """The filter has moved this foot; where it was of late moves with it."""

@@ -9,7 +9,8 @@ def build(context: Context) -> Part:
     """The core of this computer's soldier, set up from ``[fusion]``."""
     computer = context.computer
     config = computer.section("fusion", FusionConfig)
-    return CorePart(FusionCore(config, computer.identity, computer.realm.origin))
+    core = FusionCore(config, computer.identity, computer.realm.origin, patient=context.lossless)
+    return CorePart(core)
 
 
 SERVICE = Service(

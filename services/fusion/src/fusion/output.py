@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bootprint.config import Origin
-from bootprint.geodesy import LocalFrame, azimuth_of
+from bootprint.geodesy import LocalFrame, azimuth_of, major_axis_sigma_m
 from bootprint.messages import Mode, MotionClass, Position, Vector3, upper_triangle
 from fusion.state import Array
 
@@ -75,9 +75,7 @@ class Publisher:
 
 def horizontal_sigma_m(covariance: Array) -> float:
     """Root of the larger eigenvalue of the horizontal part, m."""
-    east, north = float(covariance[0, 0]), float(covariance[1, 1])
-    half = 0.5 * (east + north)
-    return math.sqrt(half + math.hypot(0.5 * (east - north), float(covariance[0, 1])))
+    return major_axis_sigma_m(float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1]))
 
 
 def reliability_pct(estimate: Estimate) -> float:

@@ -15,15 +15,15 @@ Until the heading is known only the place is: the soldier is within a circle aro
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bootprint.clock import NS_PER_S
-from bootprint.geodesy import wrap_angle
+from bootprint.geodesy import LocalFrame, wrap_angle
 from bootprint.messages import Vector3
 from fusion.alignment import RigidFit, Walk, fit_rigid
-from fusion.config import AlignConfig, GnssConfig
+from fusion.config import AlignConfig, GnssConfig, StartConfig
 from fusion.filter import chi_square_quantile
 from fusion.state import Array
 from fusion.transform import RigidTransform
@@ -45,6 +45,15 @@ class Place:
     up_sigma_m: float | None
     local: Vector3
     group: str | None = None
+
+
+def known_point(start: StartConfig, frame: LocalFrame, time_ns: int) -> Place:
+    """The configured start: where the boots frame begins."""
+    east, north = start.east_m or 0.0, start.north_m or 0.0
+    if start.latitude_deg is not None and start.longitude_deg is not None:
+        height_m = frame.origin.height_m + start.up_m
+        east, north, _ = frame.to_enu(start.latitude_deg, start.longitude_deg, height_m)
+    return Place(time_ns, (east, north, start.up_m), start.sigma_m, start.up_sigma_m, (0.0, 0.0, 0.0))
 
 
 @dataclass(slots=True)
@@ -112,6 +121,10 @@ class Placement:
     def point_to(self, place: Place, yaw_rad: float, sigma_rad: float) -> None:
         """The soldier will walk off from this place in this direction."""
         self.hint = HeadingHint(place, yaw_rad, sigma_rad, Walk.begin(place.local))
+
+    def shift(self, by_ns: int) -> None:
+        """The clock has been set: what was remembered by the old one."""
+        self.places = [replace(place, time_ns=place.time_ns + by_ns) for place in self.places]
 
     @property
     def final(self) -> RigidTransform | None:

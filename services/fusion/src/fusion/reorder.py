@@ -5,12 +5,12 @@ when either
 
 - every *expected* source has gone past it. A source's watermark is the stamp of its last message without a hole in
   the sequence before it, so a message that overtook another does not move it; or
-- the newest stamp of a driver is ``window`` later; or
-- the drivers have been silent while other stamps or `advance` (the host's event time) went on by ``patience``.
+- the `Pulse` says that nobody is waited for any longer: the newest stamp of a driver is ``window`` later, or the
+  drivers have been silent for ``patience``. (In a replay as fast as possible it never says so.)
 
 So the order in which expected sources arrive does not matter within the window (what nobody expects may find that
-it was not waited for), and others (a receiver that is quicker than the foot filter) wait for the feet. A stamp far
-from its source's last one is queued but drives nothing: one broken stamp in the future carries nobody along.
+it was not waited for), and others (a receiver that is quicker than the foot filter) wait for the feet. Stamps that
+cannot be true carry nobody along (`fusion.pulse`).
 """
 
 import heapq
@@ -18,11 +18,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 
-from bootprint.clock import NS_PER_S
 from bootprint.messages import Message
+from fusion.pulse import JUMP_NS, NEVER, Pulse, Verdict
 
-_JUMP_NS = 10 * NS_PER_S
-_NEVER = -(1 << 63)
+_Key = tuple[int, str, int]
+_LATEST_NS = 1 << 62  # in the year 2116; times must have room to be calculated with
 
 
 class Arrival(Enum):
@@ -32,6 +32,9 @@ class Arrival(Enum):
     LATE = "late"  # what stands behind it has been released: it cannot be put in order any more
     DUPLICATE = "duplicates"
     OVERFLOW = "overflow"
+    IMPLAUSIBLE = (
+        "implausible_stamps"  # too far ahead of everybody; a driver's is kept until it is contradicted
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +61,7 @@ class _Source:
     """How far one source has come without a hole."""
 
     next_sequence: int = 0
-    reached_ns: int = _NEVER
-    newest_ns: int | None = None
+    reached_ns: int = NEVER
     overtaking: dict[int, int] = field(default_factory=dict)  # sequence -> time, behind a hole
     promised: Promise | None = None
 
@@ -99,26 +101,19 @@ class _Source:
 class ReorderBuffer:
     """Holds messages back until their order is sure, for a bounded stretch of event time."""
 
-    def __init__(
-        self,
-        window_ns: int,
-        drivers: frozenset[str],
-        expected: frozenset[str],
-        patience_ns: int,
-        capacity: int = 4096,
-    ) -> None:
-        self._window_ns = window_ns
-        self._patience_ns = patience_ns
-        self._drivers = drivers
+    def __init__(self, pulse: Pulse, expected: frozenset[str], capacity: int | None = 4096) -> None:
+        self._pulse = pulse
         self._expected = expected
         self._capacity = capacity
         self._heap: list[tuple[int, str, int, Message]] = []
-        self._keys: set[tuple[int, str, int]] = set()
-        self._sources: dict[str, _Source] = {name: _Source() for name in drivers | expected}
-        self._driven_ns = _NEVER  # newest stamp of a driver
-        self._ahead_ns = _NEVER  # newest stamp or tick of anybody
-        self._quiet_since_ns = _NEVER  # how far anybody was when a driver was last heard
-        self.low_ns = _NEVER  # everything before this has been released
+        self._keys: set[_Key] = set()
+        self._lone: set[_Key] = set()  # in the heap, but perhaps wrong
+        self._sources: dict[str, _Source] = {}
+        self.low_ns = NEVER  # everything before this has been released
+        self.set_back_ns: int | None = (
+            None  # the drivers' clock has been set back to here: `restart` follows it
+        )
+        self.evicted = 0  # made room for something earlier
 
     def __len__(self) -> int:
         return len(self._heap)
@@ -128,49 +123,78 @@ class ReorderBuffer:
         key = (message.time_ns, source, message.sequence)
         if key in self._keys:
             return Arrival.DUPLICATE
-        arrival = self._arrival(message)  # before the message moves the line itself
-        if arrival is Arrival.QUEUED:
-            self._keys.add(key)
-            heapq.heappush(self._heap, (*key, message))
-        state = self._sources.setdefault(source, _Source())
-        if self._plausible(state, message.time_ns):
-            self._listen(state, source in self._drivers, message, arrival)
-            if promise is not None:
-                self._promise(promise)
+        if abs(message.time_ns) > _LATEST_NS:
+            return Arrival.IMPLAUSIBLE
+        verdict = self._pulse.hear(source, message.time_ns, self.low_ns)
+        if verdict is Verdict.REFUSED:
+            return Arrival.IMPLAUSIBLE
+        if verdict is Verdict.CONTRADICTS:
+            self._drop_lone()
+        arrival = self._queue(key, message)
+        if verdict is Verdict.LONE and arrival is Arrival.QUEUED:
+            self._lone.add(key)
+            return Arrival.IMPLAUSIBLE
+        if verdict is Verdict.SET_BACK:
+            self.set_back_ns = message.time_ns
+        if verdict in (Verdict.NEAR, Verdict.CONTRADICTS, Verdict.CONFIRMED):
+            self._listen(source, message, arrival)
+            self._promise(promise)
             self._lower()
+        if verdict is Verdict.CONFIRMED:
+            self._lone.clear()
         return arrival
 
-    def _arrival(self, message: Message) -> Arrival:
+    def _queue(self, key: _Key, message: Message) -> Arrival:
+        """Before the message moves the line itself."""
         if message.time_ns < self.low_ns:
             return Arrival.LATE
-        return Arrival.QUEUED if len(self._heap) < self._capacity else Arrival.OVERFLOW
+        if not self._has_room(key):
+            return Arrival.OVERFLOW
+        self._keys.add(key)
+        heapq.heappush(self._heap, (*key, message))
+        return Arrival.QUEUED
 
-    def _plausible(self, state: _Source, time_ns: int) -> bool:
-        last = state.newest_ns if state.newest_ns is not None else self._ahead_ns
-        state.newest_ns = time_ns
-        return last == _NEVER or abs(time_ns - last) <= _JUMP_NS
+    def _has_room(self, key: _Key) -> bool:
+        """Whether there is room for this message: what would be released last gives way."""
+        if self._capacity is None or len(self._heap) < self._capacity:
+            return True
+        latest = max(self._keys)
+        if key > latest:
+            return False
+        self.evicted += 1
+        self._drop({latest})
+        return True
 
-    def _listen(self, state: _Source, drives: bool, message: Message, arrival: Arrival) -> None:
-        if arrival is Arrival.QUEUED:
+    def _drop_lone(self) -> None:
+        self._drop(self._lone)
+        self._lone.clear()
+
+    def _drop(self, keys: set[_Key]) -> None:
+        self._heap = [entry for entry in self._heap if entry[:3] not in keys]
+        heapq.heapify(self._heap)
+        self._keys -= keys
+
+    def _source(self, name: str) -> _Source:
+        return self._sources.setdefault(name, _Source())
+
+    def _listen(self, source: str, message: Message, arrival: Arrival) -> None:
+        state = self._source(source)
+        if self._pulse.in_order:
+            state.pass_by(message.sequence, message.time_ns)
+        elif arrival is Arrival.QUEUED:
             state.take(message.sequence, message.time_ns)
         else:
             state.give_up(message.sequence, message.time_ns)
-        self._ahead_ns = max(self._ahead_ns, message.time_ns)
-        if drives:
-            self._driven_ns = max(self._driven_ns, message.time_ns)
-        if drives or self._quiet_since_ns == _NEVER:
-            self._quiet_since_ns = self._ahead_ns
 
-    def _promise(self, promise: Promise) -> None:
-        state = self._sources.setdefault(promise.source, _Source())
-        state.promised = promise
-        state.keep_promise()
+    def _promise(self, promise: Promise | None) -> None:
+        if promise is not None:
+            state = self._source(promise.source)
+            state.promised = promise
+            state.keep_promise()
 
     def advance(self, now_ns: int) -> None:
         """Event time, as the host sees it, has come to ``now_ns``."""
-        self._ahead_ns = max(self._ahead_ns, now_ns)
-        if self._quiet_since_ns == _NEVER:
-            self._quiet_since_ns = now_ns
+        self._pulse.tick(now_ns)
         self._lower()
 
     def release(self) -> Iterator[Waiting]:
@@ -178,19 +202,32 @@ class ReorderBuffer:
         while self._heap and self._heap[0][0] < self.low_ns:
             time_ns, source, sequence, message = heapq.heappop(self._heap)
             self._keys.discard((time_ns, source, sequence))
-            self._sources[source].give_up(sequence, time_ns)
+            self._lone.discard((time_ns, source, sequence))
+            self._source(source).give_up(sequence, time_ns)
             yield Waiting(time_ns, source, sequence, message)
 
     def flush(self) -> None:
-        """Nothing more will come: everything up to the drivers' newest stamp (or whoever is left) is sure."""
-        end = self._driven_ns if self._driven_ns != _NEVER else self._ahead_ns
-        self.low_ns = max(self.low_ns, end + 1)
+        """Nothing more will come: sure is all up to the drivers' newest stamp, and what goes on from there."""
+        end_ns = self._pulse.driven_ns
+        for time_ns, _, _ in sorted(self._keys):
+            if end_ns != NEVER and time_ns > end_ns + JUMP_NS:
+                break
+            end_ns = max(end_ns, time_ns)
+        self.low_ns = max(self.low_ns, end_ns + 1)
+
+    def restart(self, time_ns: int) -> int:
+        """Follow the drivers' clock back to ``time_ns``; by how much it was set (negative), ns."""
+        self.set_back_ns = None
+        self._sources.clear()  # their watermarks are of the old time, and so is what is far ahead now
+        self._drop({key for key in self._keys if key[0] > time_ns + JUMP_NS})
+        self.low_ns = NEVER
+        by_ns = self._pulse.restart(time_ns)
+        self._lower()
+        return by_ns
 
     def _lower(self) -> None:
-        """Move the line before which everything is sure; it never goes back."""
-        bound = self._driven_ns - self._window_ns
+        """Move the line before which everything is sure; it goes back in `restart` only."""
+        bound = self._pulse.sure_before_ns()
         if self._expected:
-            bound = max(bound, min(self._sources[name].reached_ns for name in self._expected))
-        if self._ahead_ns - self._quiet_since_ns > self._patience_ns:
-            bound = max(bound, self._ahead_ns - self._patience_ns)
+            bound = max(bound, min(self._source(name).reached_ns for name in self._expected))
         self.low_ns = max(self.low_ns, bound)

@@ -1,8 +1,8 @@
 """Satellite fixes on their way in: what is a position at all, how sure it is, and what became of it."""
 
 import math
-from collections import Counter
-from dataclasses import dataclass, field
+from collections import Counter, deque
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from bootprint.messages import GnssFix, Vector3
 from fusion.config import GnssConfig
 from fusion.filter import Innovation
 from fusion.models import gnss
+
+_JUDGED = 10  # fixes, for whether a receiver's stamps are of use
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,7 @@ class Satellites:
     accepted_ns: dict[str, int] = field(default_factory=dict)
     rejected_ns: dict[str, int] = field(default_factory=dict)
     normalised_squared: float = 0.0
+    _stamps: deque[bool] = field(default_factory=lambda: deque(maxlen=_JUDGED))
 
     def __post_init__(self) -> None:
         self._frame = LocalFrame(self.origin)
@@ -50,10 +53,37 @@ class Satellites:
             return self._refused("gnss_without_accuracy")
         height_m = self.origin.height_m if fix.height_m is None else fix.height_m
         enu = self._frame.to_enu(fix.latitude_deg, fix.longitude_deg, height_m)
-        if math.hypot(*enu) > 1000.0 * self.config.max_range_km:
+        if not self.is_in_range(enu):
             return self._refused("gnss_out_of_range")
         up_sigma_m = gnss.vertical_sigma_m(fix, self.config)
         return SatellitePosition(fix.time_ns, source, enu, sigma_m, up_sigma_m, self._inflation(source, fix))
+
+    def is_in_range(self, enu: Vector3) -> bool:
+        """Whether a place is near enough to the realm's origin to be meant."""
+        return math.hypot(*enu) <= 1000.0 * self.config.max_range_km  # not so if it is not a number
+
+    def note_stamp(self, *, usable: bool) -> None:
+        """A fix's stamp could be made use of, or could not: too far ahead, too late."""
+        self._stamps.append(usable)
+
+    @property
+    def is_mistimed(self) -> bool:
+        """Whether most of the last fixes had stamps of no use."""
+        return len(self._stamps) >= _JUDGED // 2 and 2 * sum(self._stamps) < len(self._stamps)
+
+    def late(self, position: SatellitePosition, moved: Vector3, late_s: float) -> SatellitePosition:
+        """A late fix as one of now: carried along by what was walked since, and the less sure by the delay."""
+        east, north, up = (at + by for at, by in zip(position.enu, moved, strict=True))
+        added_m = self.config.late_sigma_m_s * late_s
+        up_sigma_m = None if position.up_sigma_m is None else math.hypot(position.up_sigma_m, added_m)
+        sigma_m = math.hypot(position.sigma_m, added_m)
+        return replace(position, enu=(east, north, up), sigma_m=sigma_m, up_sigma_m=up_sigma_m)
+
+    def shift(self, by_ns: int) -> None:
+        """The clock has been set: what was remembered by the old one."""
+        for remembered in (self.accepted_ns, self.rejected_ns):
+            for source in remembered:
+                remembered[source] += by_ns
 
     def _refused(self, why: str) -> SatellitePosition | None:
         self.counters[why] += 1

@@ -25,8 +25,10 @@ class PdrConfig(Config, frozen=True):
         "right_foot",
     )
     foot: FootSettings = FootSettings()
-    pose_interval_s: Annotated[float, msgspec.Meta(ge=0.01)] = 0.1  # event time between two FootPoses
-    silent_after_s: Annotated[float, msgspec.Meta(gt=0.0)] = 2.0  # event time until a foot is reported silent
+    pose_interval_s: Annotated[float, msgspec.Meta(ge=0.01, le=10.0)] = (
+        0.1  # event time between two FootPoses
+    )
+    silent_after_s: Annotated[float, msgspec.Meta(gt=0.0, le=3600.0)] = 2.0  # until a foot is reported silent
 
     @property
     def feet(self) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
 """The hub's core: own messages and heard frames in; tracks, alerts, link reports and frames to send out.
 
 Pure: event time comes with `tick` and `receive`, frames to send wait in `take_frames`. All radio decisions fall on
-a grid of 0.1 s of event time, so they do not depend on how often `tick` is called.
+a grid of 0.1 s of event time. Steps that were missed are made up (the last 10 s of them) with what was known at
+their time, so decisions do not depend on how often `tick` is called.
 """
 
 from collections import Counter, OrderedDict
@@ -10,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import msgspec
+import structlog
 
 from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
@@ -17,15 +19,18 @@ from bootprint.config import Member, Realm
 from bootprint.figures import Figures
 from bootprint.messages import Alert, Fix, Message, Observation, Position, Status
 from bootprint.topics import SUBJECT_OF, Address, Identity
+from sa_hub.own_reports import OwnReports
 from sa_hub.radio.content import MAX_HOPS, Condition, Notice, Report, Reports, StatusNotice, one_hop_on
 from sa_hub.radio.net import RadioNet
 from sa_hub.radio.outbox import Key, key_of
 from sa_hub.radio.replay import Memory
 from sa_hub.settings import HubSettings
-from sa_hub.tracks import Ages, Known, SenderClock, SmoothVelocity, Tracks
+from sa_hub.tracks import CLOCK_SET_BACK_NS, Ages, Known, SenderClock, SmoothVelocity, Tracks
 from sa_hub.translate import message_of, notice_of, report_of_fix, report_of_position, track_of
 
 STEP_NS: Final = 100_000_000
+STEPS_PER_S: Final = NS_PER_S // STEP_NS
+MOST_STEPS_MADE_UP: Final = 10 * STEPS_PER_S
 _REMEMBERED_NOTICES: Final = 512
 
 
@@ -57,7 +62,9 @@ class HubCore:
         self._seen: OrderedDict[Key, None] = OrderedDict()
         self._sequences: Counter[Address] = Counter()
         self._placed: Report | None = None
-        self._now_ns = self._last_step = self._last_second = 0
+        self._own = OwnReports()
+        self._now_ns = 0
+        self._last_step: int | None = None
         self._frames: list[OutgoingFrame] = []
 
     # -- the core's four entrances ----------------------------------------------------------------------------
@@ -83,26 +90,21 @@ class HubCore:
 
     def receive(self, link: str, datagram: bytes, now_ns: int) -> list[Envelope]:
         """A datagram from a link, arrived at ``now_ns`` of event time; anything may be in it."""
-        self._now_ns = max(self._now_ns, now_ns)
+        self._advance(now_ns)
+        # What was to be decided before this moment is decided before this is known.
+        outputs = [] if self._last_step is None else self._steps_until((self._now_ns - 1) // STEP_NS)
         heard = self._nets[link].hear(datagram, self._now_ns, self._roster, exercise=self._settings.exercise)
         if heard is None:
-            return []
+            return outputs
         sender, content = heard
         if isinstance(content, Reports):
-            return self._heard_reports(sender, content.reports, link)
-        return self._heard_notice(content, link)
+            return outputs + self._heard_reports(sender, content.reports, link)
+        return outputs + self._heard_notice(content, link)
 
     def tick(self, now_ns: int) -> list[Envelope]:
         """Event time is ``now_ns``: tracks age, nets speak, links report."""
-        self._now_ns = max(self._now_ns, now_ns)
-        outputs = [self._track(known) for known in self._tracks.changes(self._now_ns)]
-        if self._now_ns // STEP_NS > self._last_step:
-            self._last_step = self._now_ns // STEP_NS
-            self._speak()
-        if self._now_ns // NS_PER_S > self._last_second:
-            self._last_second = self._now_ns // NS_PER_S
-            outputs += self._each_second()
-        return outputs
+        self._advance(now_ns)
+        return self._steps_until(self._now_ns // STEP_NS)
 
     def take_frames(self) -> list[OutgoingFrame]:
         """The frames to send since the last call, in order."""
@@ -129,15 +131,54 @@ class HubCore:
             counters.update({f"radio_{cause}": count for cause, count in net.meter.rejected.items()})
             counters["notices_dropped"] += net.outbox.dropped
             counters["radio_counter_faults"] += net.counter_faults
+            counters["radio_faults"] += net.faults
         states = Counter(known.state for known in self._tracks.all())
         gauges = {f"tracks_{state}": float(states[state]) for state in ("fresh", "stale", "lost")}
-        silent = counters["radio_counter_faults"] > 0
-        return Figures(
-            state="degraded" if silent else "ok",
-            counters=dict(counters),
-            gauges=gauges,
-            note="no fresh radio counters can be reserved: not sending" if silent else "",
+        note = _note(counters) or self._unopened_nets()
+        return Figures("degraded" if note else "ok", dict(counters), gauges, note)
+
+    def _unopened_nets(self) -> str:
+        """Nets on which frames are heard of which none can be opened."""
+        deaf = [name for name, net in self._nets.items() if net.opens_nothing]
+        return (
+            f"hears frames on {', '.join(deaf)} but can open none: is the group key the same?" if deaf else ""
         )
+
+    # -- time -------------------------------------------------------------------------------------------------
+
+    def _advance(self, now_ns: int) -> None:
+        """Event time is ``now_ns``, or stands still until it is; far back means that a clock was set right."""
+        if now_ns < self._now_ns - CLOCK_SET_BACK_NS:
+            self._set_back(self._now_ns - now_ns)
+        self._now_ns = max(self._now_ns, now_ns)
+        self._own.settle(self._now_ns)
+        self._tracks.own_arrived(self._now_ns)
+
+    def _set_back(self, by_ns: int) -> None:
+        """Our clock was set back: what is held in hub time goes with it, so that ages and budgets run on."""
+        self.counters["clock_set_back"] += 1
+        self._now_ns -= by_ns
+        self._last_step = None
+        self._clocks.clear()
+        self._own.clear()
+        self._tracks.set_back(by_ns)
+        for net in self._nets.values():
+            net.set_back(by_ns)
+
+    def _steps_until(self, step: int) -> list[Envelope]:
+        """The steps since the last one, this one included; the first of all stands alone."""
+        last = step - 1 if self._last_step is None else self._last_step
+        self._last_step = max(last, step)
+        first = max(last + 1, step - MOST_STEPS_MADE_UP + 1)
+        return [output for each in range(first, step + 1) for output in self._step(each)]
+
+    def _step(self, step: int) -> Iterable[Envelope]:
+        """Tracks age, nets speak, and once a second links report."""
+        step_ns = step * STEP_NS
+        yield from [self._track(known) for known in self._tracks.changes(step_ns)]
+        self._speak(step_ns)
+        if step % STEPS_PER_S == 0:
+            yield from self._each_second(step_ns)
 
     # -- our own soldier --------------------------------------------------------------------------------------
 
@@ -158,11 +199,11 @@ class HubCore:
         return self._own_report(self._placed)
 
     def _own_report(self, report: Report) -> list[Envelope]:
-        received_ns = max(self._now_ns, report.time_ns)
-        known = self._tracks.update(report, received_ns, "own")
+        known = self._tracks.update(report, max(self._now_ns, report.time_ns), "own")
         if known is None:
             self.counters["positions_out_of_order"] += 1
             return []
+        self._own.add(report, self._now_ns)
         return [self._track(known)]
 
     def _own_notice(self, message: Alert | Observation | Status) -> list[Envelope]:
@@ -178,9 +219,8 @@ class HubCore:
 
     def _heard_reports(self, sender: int, reports: Sequence[Report], link: str) -> list[Envelope]:
         clock = self._clocks.setdefault(sender, SenderClock())
-        for report in reports:
-            if report.number == sender and report.hops == 0:
-                clock.observe(report.time_ns, self._now_ns)
+        own = [report.time_ns for report in reports if report.number == sender and report.hops == 0]
+        clock.observe(own, max(report.time_ns for report in reports), self._now_ns)
         outputs: list[Envelope] = []
         for report in reports:
             outputs += self._heard_report(replace(report, time_ns=report.time_ns + clock.offset_ns), link)
@@ -232,30 +272,37 @@ class HubCore:
 
     # -- what is told -----------------------------------------------------------------------------------------
 
-    def _speak(self) -> None:
-        candidates = self._candidates()
+    def _speak(self, step_ns: int) -> None:
+        candidates = self._candidates(step_ns)
         for name, net in self._nets.items():
-            frames = net.speak(candidates, self._now_ns)
+            try:
+                frames = net.speak(candidates, step_ns)
+            except Exception:
+                # A fault in one net's speech must not silence the others, nor lose the tracks of this step.
+                net.faults += 1
+                structlog.get_logger().exception("a net cannot speak", link=name, count=net.faults)
+                continue
             self._frames += [OutgoingFrame(name, data) for data in frames]
 
-    def _candidates(self) -> list[Report]:
+    def _candidates(self, step_ns: int) -> list[Report]:
         """Our own report and, from a relay, everyone's that is not lost and may pass another relay."""
         candidates: list[Report] = []
         for known in self._tracks.all():
             if known.state == "lost":
                 continue
             if known.report.number == self._member.number:
-                candidates.append(known.report)
+                own = self._own.at(step_ns, self._now_ns)
+                candidates += [] if own is None else [own]
             elif self._settings.relays and known.report.hops < MAX_HOPS:
                 candidates.append(one_hop_on(known.report))
         return candidates
 
-    def _each_second(self) -> Iterable[Envelope]:
+    def _each_second(self, second_ns: int) -> Iterable[Envelope]:
         """Link reports, and a command post that still stands where it was put."""
         if self._placed is not None:
-            yield from self._own_report(replace(self._placed, time_ns=self._now_ns))
+            yield from self._own_report(replace(self._placed, time_ns=second_ns))
         for name, net in self._nets.items():
-            yield self._envelope(name, net.report(self._now_ns))
+            yield self._envelope(name, net.report(second_ns))
 
     def _track(self, known: Known) -> Envelope:
         member = self._roster[known.report.number]
@@ -271,6 +318,13 @@ class HubCore:
         sequence = self._sequences[address]
         self._sequences[address] += 1
         return Envelope(address, msgspec.structs.replace(message, sequence=sequence))
+
+
+def _note(counters: Mapping[str, int]) -> str:
+    """What is wrong, if anything is."""
+    if counters["radio_counter_faults"]:
+        return "no fresh radio counters can be reserved: not sending"
+    return "a radio net cannot speak, see the log" if counters["radio_faults"] else ""
 
 
 def _ages(settings: HubSettings) -> tuple[Ages, Ages]:

@@ -3,10 +3,9 @@
 import math
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Final
 
 from bootprint.bus import Envelope
@@ -20,7 +19,7 @@ from sa_hub.keys import load_group_key
 from sa_hub.radio.counters import FileCounters
 from sa_hub.radio.links.udp import UdpLink
 from sa_hub.radio.replay import Memory
-from sa_hub.radio.replay_file import load_memory, save_memory
+from sa_hub.radio.replay_file import MemoryFile
 from sa_hub.settings import HubSettings, check_settings
 
 _LATENCIES: Final = 512
@@ -36,7 +35,7 @@ class LatencyGauge:
     def observe(self, outputs: Iterable[Envelope]) -> None:
         """Note the tracks of our own soldier among these outputs."""
         for envelope in outputs:
-            if isinstance(envelope.message, Track) and envelope.message.via == "own":
+            if isinstance(envelope.message, Track) and _is_sensed(envelope.message):
                 latency_s = self._clock.host_seconds_since(envelope.message.time_ns)
                 if latency_s is not None:
                     self._seconds.append(latency_s)
@@ -49,14 +48,21 @@ class LatencyGauge:
         return {"latency_p99_ms": 1e3 * ordered[math.ceil(0.99 * len(ordered)) - 1]}
 
 
-class HubPart:
-    """A hub's core with its sockets; replay memory is written before what a frame said is published."""
+def _is_sensed(track: Track) -> bool:
+    """Whether this is our own soldier's track with a sensor behind it: a coasting one is late by design."""
+    return track.via == "own" and track.mode in ("gnss", "boots", "body", "camera")
 
-    def __init__(self, context: Context, core: HubCore, settings: HubSettings, radio_dir: Path) -> None:
+
+class HubPart:
+    """A hub's core with its sockets; replay memory is kept before what a frame said is published."""
+
+    def __init__(
+        self, context: Context, core: HubCore, settings: HubSettings, memories: Mapping[str, MemoryFile]
+    ) -> None:
         self._context = context
         self._core = core
         self._latency = LatencyGauge(context.clock)
-        self._radio_dir = radio_dir
+        self._memories = memories
         self._memory_faults = 0
         self._links = {link.name: UdpLink(link, partial(self._arrived, link.name)) for link in settings.links}
 
@@ -73,12 +79,12 @@ class HubPart:
         heard_before = self._core.frames_heard(name)
         outputs = self._core.receive(name, data, self._context.clock.now_ns())
         if self._core.frames_heard(name) != heard_before:
-            self._save_memory(name)
+            self._keep(name, self._memories[name].keep)
         return outputs
 
-    def _save_memory(self, name: str) -> None:
+    def _keep(self, name: str, write: Callable[[Memory], None]) -> None:
         try:
-            save_memory(_memory_path(self._radio_dir, name), self._core.memory(name))
+            write(self._core.memory(name))
         except OSError:
             self._memory_faults += 1
 
@@ -107,9 +113,10 @@ class HubPart:
         )
 
     def close(self) -> Iterable[Envelope]:
-        """Close the sockets."""
-        for link in self._links.values():
+        """Close the sockets; what was heard is complete then."""
+        for name, link in self._links.items():
             link.close()
+            self._keep(name, self._memories[name].close)
         return ()
 
 
@@ -120,26 +127,19 @@ def build(context: Context) -> HubPart:
     check_settings(settings, f"{computer.path}: [hub]")
     key = load_group_key(computer.keys_dir / f"{settings.group_key or computer.realm.group_key}.key")
     radio_dir = computer.state_dir / "radio"
+    files = {link.name: MemoryFile(radio_dir / f"{link.name}.heard") for link in settings.links}
+
+    def counters(net: str) -> FileCounters:
+        return FileCounters(radio_dir / f"{net}.counters", time.time, earlier_life=files[net].path)
 
     def memory(net: str) -> Memory:
-        loaded, sound = load_memory(_memory_path(radio_dir, net))
+        loaded, sound = files[net].load()
         if not sound:
             context.log.warning("replay memory is damaged, starting afresh", net=net)
         return loaded
 
-    core = build_hub(
-        computer.realm,
-        computer.member,
-        settings,
-        key,
-        counters=lambda net: FileCounters(radio_dir / f"{net}.counters", time.time),
-        memories=memory,
-    )
-    return HubPart(context, core, settings, radio_dir)
-
-
-def _memory_path(radio_dir: Path, net: str) -> Path:
-    return radio_dir / f"{net}.heard"
+    core = build_hub(computer.realm, computer.member, settings, key, counters, memories=memory)
+    return HubPart(context, core, settings, files)
 
 
 SERVICE = Service(

@@ -46,6 +46,15 @@ class LinkProfile(Config, frozen=True):
     mtu_bytes: Annotated[int, msgspec.Meta(ge=SMALLEST_MTU_BYTES, le=60_000)] = 250
     threshold_m: Positive | None = None
 
+    @property
+    def copies(self) -> int:
+        """How often each frame goes on the air: once for every peer."""
+        return max(1, len(self.peers))
+
+    def air_bytes(self, frame_bytes: int) -> int:
+        """What a frame costs on the air, to all peers, the link's headers included."""
+        return self.copies * (frame_bytes + self.header_bytes)
+
 
 class HubSettings(Config, frozen=True):
     """What a hub is and when it speaks; times are event time."""
@@ -88,10 +97,11 @@ def _check_link(link: LinkProfile, where: str) -> None:
         check_part("name", link.name)
     except ValueError as error:
         raise ConfigError(f"{where}: {error}") from error
-    needed = 8 * (SMALLEST_MTU_BYTES + link.header_bytes)
+    needed = 8 * link.air_bytes(SMALLEST_MTU_BYTES)
     depth = depth_bits(link.rate_bits_per_s)
     if depth < needed:
         raise ConfigError(
             f"{where}: at {link.rate_bits_per_s} bit/s no more than {depth} bits go in one burst, "
-            f"a frame may need {needed}; want a higher rate_bits_per_s or fewer header_bytes"
+            f"a frame to {link.copies} peer(s) may need {needed}; "
+            "want a higher rate_bits_per_s, fewer header_bytes or peers"
         )

@@ -2,8 +2,8 @@
 
 import math
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 from bootprint.clock import NS_PER_S
@@ -15,6 +15,9 @@ CLOCK_TOLERANCE_NS: Final = 10 * NS_PER_S
 CLOCK_SET_BACK_NS: Final = 60 * NS_PER_S
 """Our own positions going back by more than this mean that a clock was set right, not that one came late."""
 _CLOCK_SAMPLES: Final = 8
+_CLOCK_SET_SAMPLES: Final = 3
+_RELAYED_ONLY: Final = 64
+"""Frames without the sender's own report after which its old ones tell nothing of its clock any more."""
 _SMOOTHING_S: Final = 1.5
 
 
@@ -77,6 +80,18 @@ class Tracks:
                 known.state = state
                 yield known
 
+    def own_arrived(self, now_ns: int) -> None:
+        """It is ``now_ns``: our own report, whatever its stamp says, came no later than this."""
+        own = self._known.get(self._own)
+        if own is not None:
+            own.received_ns = min(own.received_ns, now_ns)
+
+    def set_back(self, by_ns: int) -> None:
+        """The clock was set back by so much: everyone is as old as before."""
+        for known in self._known.values():
+            known.report = replace(known.report, time_ns=known.report.time_ns - by_ns)
+            known.received_ns -= by_ns
+
     def _supersedes(self, report: Report, known: Report) -> bool:
         set_back = report.number == self._own and known.time_ns - report.time_ns > CLOCK_SET_BACK_NS
         return report.time_ns > known.time_ns or set_back
@@ -88,26 +103,45 @@ class Tracks:
 
 
 class SenderClock:
-    """How far a sender's clock is behind ours, from the times its frames tell of the sender itself.
+    """How far a sender's clock is behind ours, from the times that its frames tell.
 
     The smallest of the last differences (arrival − report), for a frame's way only adds to it; within ten seconds
-    the sender's clock is taken as right.
+    the sender's clock is taken as right. What a frame tells of its sender is of the moment that it was sent. What
+    it relays may be old, so that alone never proves a clock to be behind; but nothing is reported before it
+    happens, so a newest report in our future proves the sender's clock to be ahead. Three differences in a row a
+    minute above the smallest mean that the sender's clock was set back.
     """
 
     def __init__(self) -> None:
-        self._differences_ns: deque[int] = deque(maxlen=_CLOCK_SAMPLES)
+        self._own_ns: deque[int] = deque(maxlen=_CLOCK_SAMPLES)
+        self._newest_ns: deque[int] = deque(maxlen=_CLOCK_SAMPLES)
+        self._relayed_only = 0
 
-    def observe(self, reported_ns: int, arrived_ns: int) -> None:
-        """A sender's report of itself has arrived."""
-        self._differences_ns.append(arrived_ns - reported_ns)
+    def observe(self, own_ns: Sequence[int], newest_ns: int, arrived_ns: int) -> None:
+        """A frame has arrived: the sender's reports of itself in it, if any, and its newest report of anybody."""
+        self._relayed_only = 0 if own_ns else self._relayed_only + 1
+        if self._relayed_only > _RELAYED_ONLY:
+            self._own_ns.clear()
+        for time_ns in own_ns:
+            _append(self._own_ns, arrived_ns - time_ns)
+        _append(self._newest_ns, arrived_ns - newest_ns)
 
     @property
     def offset_ns(self) -> int:
         """What to add to the sender's times to have ours."""
-        if not self._differences_ns:
-            return 0
-        least = min(self._differences_ns)
+        least = min((*self._own_ns, *self._newest_ns), default=0)
+        if not self._own_ns:
+            least = min(least, 0)
         return 0 if abs(least) <= CLOCK_TOLERANCE_NS else least
+
+
+def _append(differences_ns: deque[int], difference_ns: int) -> None:
+    """Take a difference in; after three in a row a minute above the smallest, those before are of another clock."""
+    differences_ns.append(difference_ns)
+    recent = list(differences_ns)[-_CLOCK_SET_SAMPLES:]
+    if len(recent) == _CLOCK_SET_SAMPLES and min(recent) > min(differences_ns) + CLOCK_SET_BACK_NS:
+        differences_ns.clear()
+        differences_ns.extend(recent)
 
 
 class SmoothVelocity:

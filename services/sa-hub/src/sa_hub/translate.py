@@ -3,6 +3,7 @@
 import math
 
 from bootprint.config import Member
+from bootprint.geodesy import major_axis_sigma_m
 from bootprint.messages import Alert, Fix, Message, Observation, Position, Status, Track
 from sa_hub.radio.content import (
     AlertNotice,
@@ -19,12 +20,13 @@ def report_of_position(
     position: Position, number: int, velocity_m_s: tuple[float, float], condition: Condition
 ) -> Report:
     """A soldier's fused position as the radio tells it."""
+    east_m2, cross_m2, _, north_m2, _, _ = position.covariance_m2
     return Report(
         number=number,
         time_ns=position.time_ns,
         latitude_deg=position.latitude_deg,
         longitude_deg=position.longitude_deg,
-        accuracy_m=major_axis_m(position.covariance_m2),
+        accuracy_m=major_axis_sigma_m(east_m2, cross_m2, north_m2),
         east_m_s=velocity_m_s[0],
         north_m_s=velocity_m_s[1],
         height_m=position.height_m,
@@ -46,13 +48,6 @@ def report_of_fix(fix: Fix, number: int, condition: Condition) -> Report:
         mode="coasting",
         condition=condition,
     )
-
-
-def major_axis_m(covariance_m2: tuple[float, float, float, float, float, float]) -> float:
-    """One sigma along the longer axis of the horizontal ellipse; covariance is (ee, en, eu, nn, nu, uu)."""
-    east, cross, _, north, _, _ = covariance_m2
-    mean, half_difference = (east + north) / 2.0, (east - north) / 2.0
-    return math.sqrt(max(0.0, mean + math.hypot(half_difference, cross)))
 
 
 def track_of(known: Known, member: Member) -> Track:

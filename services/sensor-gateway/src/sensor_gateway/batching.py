@@ -19,8 +19,8 @@ class ImuBatcher:
         self._samples: Samples = []
 
     def add(self, utc_ns: int, reading: ImuReading) -> Iterator[Samples]:
-        """Take a sample; yield what it completes: the batch it is too late for, or the one it fills."""
-        if self.is_due(utc_ns):
+        """Take a sample; yield what it completes: the batch it does not fit into, or the one it fills."""
+        if self.is_due(utc_ns) or (self._samples and utc_ns < self._samples[-1][0]):
             yield self.take()
         self._samples.append((utc_ns, reading))
         if len(self._samples) >= self._size:

@@ -3,8 +3,13 @@
 The offset is that of the least delayed samples (`offset_line`), or of the device's own statements of UTC once
 it has satellite time. What is applied moves towards it slowly, so that intervals stay true and no stamp goes
 back. A device that restarts, or whose clock leaps or wraps, begins a new epoch and is counted.
+
+A statement that contradicts what is known by more than a second is believed when others confirm it. Only when the
+best known offset stays behind the applied one by more than a second, which would take minutes or years to make up
+slowly, do stamps go back, once; that is counted, too.
 """
 
+from sensor_gateway.doubt import Doubt
 from sensor_gateway.offset_line import MinimumDelayLine
 
 _NS_PER_S = 1_000_000_000
@@ -12,6 +17,9 @@ _NS_PER_S = 1_000_000_000
 _LEAP_NS = _NS_PER_S
 # Samples that stay so late for so long are not delayed: the host's clock was set forward.
 _STAYS_LATE_NS = 2 * _NS_PER_S
+# Contradicting statements of UTC that must agree; how long (device time) the offset must stay too far ahead.
+_STATEMENTS = 3
+_STAYS_AHEAD_NS = 5 * _NS_PER_S
 # How fast the applied offset follows, in seconds per second: an interval is never wrong by more.
 _SLEW = 0.005
 
@@ -22,6 +30,10 @@ class DeviceClock:
     def __init__(self) -> None:
         self.resets = 0
         self.steps = 0
+        self.set_backs = 0
+        self.doubted = 0
+        self._doubt = Doubt(_STATEMENTS, _LEAP_NS)
+        self._ahead_for_ns = 0
         self._by_arrival = MinimumDelayLine()
         self._by_device = MinimumDelayLine()
         self._newest_device_ns: int | None = None
@@ -31,7 +43,7 @@ class DeviceClock:
         self._last_utc_ns: int | None = None
 
     def utc_ns(self, device_ns: int, received_ns: int) -> int:
-        """UTC of a stamp received now; strictly later for a later stamp, whatever the clocks do."""
+        """UTC of a stamp received now; later for a later stamp unless ``set_backs`` has risen."""
         self.observe(device_ns, received_ns)
         utc = device_ns + self._applied_ns
         if self._last_utc_ns is None or utc > self._last_utc_ns:
@@ -54,9 +66,16 @@ class DeviceClock:
     def state_utc(self, device_ns: int, utc_ns: int) -> None:
         """The device itself says which UTC a stamp of its clock is; stamps are cut off, never ahead."""
         offset_ns = utc_ns - device_ns
-        if self._by_device and abs(offset_ns - self._by_device.at(device_ns)) > _LEAP_NS:
-            self.steps += 1
+        contradicts = abs(offset_ns - self.target_ns(device_ns)) > _LEAP_NS
+        if contradicts and self._last_utc_ns is not None:
+            self.doubted += 1
+            settled_ns = self._doubt.settle(device_ns, offset_ns)
+            if settled_ns is None:
+                return
+            self.steps += bool(self._by_device)
             self._by_device.clear()
+            offset_ns = settled_ns
+        self._doubt.clear()
         self._by_device.add(device_ns, offset_ns)
         if self._last_utc_ns is None:
             self._applied_ns = self.target_ns(device_ns)
@@ -85,7 +104,9 @@ class DeviceClock:
     def _begin_epoch(self, device_ns: int, received_ns: int) -> None:
         self._by_arrival.clear()
         self._by_device.clear()
+        self._doubt.clear()
         self._late_since_ns = None
+        self._ahead_for_ns = 0
         self._by_arrival.add(device_ns, received_ns - device_ns)
         self._newest_device_ns, self._received_ns = device_ns, received_ns
         self._applied_ns = received_ns - device_ns
@@ -109,10 +130,15 @@ class DeviceClock:
         return received_ns - self._late_since_ns > _STAYS_LATE_NS
 
     def _follow(self, elapsed_ns: int, target_ns: int) -> None:
-        """Step forward over a leap; otherwise, and always backward, move slowly."""
+        """Step forward over a leap, and back over one that lasts; otherwise move slowly."""
         error_ns = target_ns - self._applied_ns
+        self._ahead_for_ns = self._ahead_for_ns + elapsed_ns if error_ns < -_LEAP_NS else 0
         if error_ns > _LEAP_NS:
             self._applied_ns = target_ns
-            return
-        limit_ns = int(_SLEW * elapsed_ns)
-        self._applied_ns += max(-limit_ns, min(limit_ns, error_ns))
+        elif self._ahead_for_ns > _STAYS_AHEAD_NS:
+            self.set_backs += 1
+            self._last_utc_ns = target_ns + (self._newest_device_ns or 0)
+            self._ahead_for_ns, self._applied_ns = 0, target_ns
+        else:
+            limit_ns = int(_SLEW * elapsed_ns)
+            self._applied_ns += max(-limit_ns, min(limit_ns, error_ns))

@@ -15,6 +15,7 @@ from bootprint.errors import ConfigError
 from bootprint.figures import Figures
 from bootprint.service import Context, Part
 from sensor_gateway import settings as config
+from sensor_gateway.host_utc import HostUtc
 from sensor_gateway.intake import Intake
 from sensor_gateway.sources.replay import Replay
 from sensor_gateway.sources.serial import SerialReader
@@ -67,6 +68,8 @@ class Gateway:
         self._replayed: list[ReplayedSource] = []
         self._threads: list[threading.Thread] = []
         self._opened_ns = 0
+        self._host = HostUtc()
+        self._logged_steps = 0
 
     def start(self) -> None:
         """Open every source, so that what is wrong is said at once; then let them run."""
@@ -85,7 +88,7 @@ class Gateway:
         if isinstance(source, config.ReplaySource):
             self._replayed.append(ReplayedSource(name, Replay(self._context, source)))
             return
-        intake = Intake(self._context.identity, source)
+        intake = Intake(self._context.identity, source, self._host)
         self._live.append(LiveSource(name, self._reader(source, intake), intake))
 
     def _reader(self, source: config.SerialSource | config.UdpSource, intake: Intake) -> Reader:
@@ -109,15 +112,18 @@ class Gateway:
 
     def tick(self, now_ns: int) -> Iterable[Envelope]:
         """Batches whose sensors fell silent."""
+        if self._host.steps > self._logged_steps:
+            self._logged_steps = self._host.steps
+            self._context.log.warning("host clock against UTC", utc_offset_s=self._host.offset_ns / 1e9)
         return [envelope for source in self._live for envelope in source.intake.tick(now_ns)]
 
     def figures(self) -> Figures:
         """Faults, counts and rates of every source; degraded while one is unplugged, silent or dead."""
         now_ns = self._context.clock.now_ns()
-        counters: dict[str, int] = {}
-        gauges: dict[str, float] = {}
+        counters: dict[str, int] = {"utc_offset_steps": self._host.steps}
+        gauges: dict[str, float] = {"utc_offset_s": self._host.offset_ns / 1e9}
         faults = [f"{thread.name}: reader ended" for thread in self._dead()]
-        notes: list[str] = []
+        notes = [self._host.note] if self._host.note else []
         for live in self._live:
             counters |= _prefixed(live.name, {**live.reader.counts, **live.intake.counters()})
             gauges |= _prefixed(live.name, live.intake.gauges())

@@ -5,19 +5,24 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 
 from bootprint.bus import Envelope
-from bootprint.messages import ImuBatch
+from bootprint.messages import GnssFix, ImuBatch
 from bootprint.topics import BY_SUBJECT, SUBJECT_OF, Identity
 from sensor_gateway.batching import ImuBatcher, Samples, mags
 from sensor_gateway.clock import DeviceClock
 from sensor_gateway.decoders.gnss import GnssDecoder
 from sensor_gateway.decoders.mavlink import MavlinkDecoder
+from sensor_gateway.host_utc import HostUtc
 from sensor_gateway.rates import RateMeter
 from sensor_gateway.readings import ClockId, Decoder, ImuReading, MessageReading, Reading, TimeReading
 from sensor_gateway.settings import Device
+from sensor_gateway.stamp_line import StampLine
 from sensor_gateway.stamps import restamped
 
 # A source is silent when it misses three messages, and a second more.
 _SILENT_MESSAGES, _SILENT_S = 3.0, 1.0
+# Pressure is expected at 10 Hz, but a HIGHRES_IMU may carry it at 200 Hz: of faster sources every nth is kept.
+_PRESSURE_INTERVAL_NS = 75_000_000
+_DROPPED = {"duplicate": "duplicates", "back": "stamps_back"}
 
 
 def make_decoder(device: Device) -> Decoder:
@@ -26,30 +31,40 @@ def make_decoder(device: Device) -> Decoder:
 
 
 class Intake:
-    """The messages of one device. What is not finite, out of range, repeated or late is dropped and counted."""
+    """The messages of one device. What is not finite, out of range, repeated or late is dropped and counted.
 
-    def __init__(self, identity: Identity, device: Device) -> None:
+    Times handed in are the host's; ``host`` knows how far they are from UTC.
+    """
+
+    def __init__(self, identity: Identity, device: Device, host: HostUtc | None = None) -> None:
         self._identity = identity
+        self._host = HostUtc() if host is None else host
         self._device = device
         self._decoder = make_decoder(device)
         self._counts: Counter[str] = Counter()
         self._clocks: defaultdict[ClockId, DeviceClock] = defaultdict(DeviceClock)
         self._batchers: dict[str, ImuBatcher] = {}
-        self._newest_ns: dict[tuple[str, str], int] = {}
+        self._lines: defaultdict[tuple[str, str, bool], StampLine] = defaultdict(StampLine)
         self._sequences: Counter[tuple[str, str]] = Counter()
         self._heard_ns: dict[tuple[str, str], int] = {}
+        self._host_ns = 0
         self._rates = RateMeter()
 
-    def feed(self, data: bytes, received_ns: int) -> list[Envelope]:
-        """Take bytes that the host received at this UTC time."""
+    def feed(self, data: bytes, host_ns: int) -> list[Envelope]:
+        """Take bytes that came when the host's clock stood here."""
+        self._host_ns = host_ns
+        received_ns = self._host.utc_ns(host_ns)
         return self._messages(self._decoder.feed(data, received_ns), received_ns)
 
-    def cut(self, received_ns: int) -> list[Envelope]:
+    def cut(self, host_ns: int) -> list[Envelope]:
         """The stream was cut (unplugged, or the end): drop the half message, give out all that is whole."""
+        self._host_ns = host_ns
+        received_ns = self._host.utc_ns(host_ns)
         return [*self._messages(self._decoder.cut(received_ns), received_ns), *self._flush()]
 
-    def tick(self, now_ns: int) -> list[Envelope]:
+    def tick(self, host_ns: int) -> list[Envelope]:
         """A batch whose sensor fell silent does not wait for its next sample."""
+        now_ns = self._host.utc_ns(host_ns)
         due = [place for place, batcher in self._batchers.items() if batcher.is_due(now_ns)]
         return [self._batch(place, self._batchers[place].take()) for place in due]
 
@@ -60,6 +75,8 @@ class Intake:
             **(self._decoder.counts + self._counts),
             "clock_resets": sum(clock.resets for clock in clocks),
             "clock_steps": sum(clock.steps for clock in clocks),
+            "clock_set_backs": sum(clock.set_backs for clock in clocks),
+            "clock_statements_doubted": sum(clock.doubted for clock in clocks),
         }
 
     def gauges(self) -> dict[str, float]:
@@ -67,12 +84,12 @@ class Intake:
         behind_ns = max((abs(clock.behind_ns) for clock in self._clocks.values()), default=0)
         return {**self._rates.take(), "clock_behind_ms": behind_ns / 1e6}
 
-    def silent(self, now_ns: int, opened_ns: int) -> list[str]:
-        """The sensors from which nothing has come for too long."""
+    def silent(self, host_ns: int, opened_ns: int) -> list[str]:
+        """The sensors from which nothing has come for too long, since it was opened at least."""
         return [
             f"{subject}/{source} is silent"
             for subject, source in self._device.expected()
-            if now_ns - self._heard_ns.get((subject, source), opened_ns) > _silence_ns(subject)
+            if host_ns - self._heard_ns.get((subject, source), opened_ns) > _silence_ns(subject)
         ]
 
     def notes(self) -> list[str]:
@@ -101,7 +118,7 @@ class Intake:
             self._counts["not_finite"] += 1
             return
         utc_ns = self._clocks[reading.clock].utc_ns(reading.device_ns, received_ns)
-        if not self._advances("imu", reading.place, utc_ns, received_ns):
+        if not self._advances("imu", reading.place, utc_ns):
             return
         batcher = self._batchers.get(reading.place)
         if batcher is None:
@@ -116,7 +133,9 @@ class Intake:
         shift_ns = 0
         if reading.clock is not None:
             shift_ns = self._clocks[reading.clock].utc_ns(message.time_ns, received_ns) - message.time_ns
-        if not self._advances(subject, source, message.time_ns + shift_ns, received_ns):
+        else:
+            self._compare_with_host(reading)
+        if not self._advances(subject, source, message.time_ns + shift_ns, reading.stamped_by == "arrival"):
             return
         try:
             stamped = restamped(message, shift_ns, self._next_sequence(subject, source))
@@ -125,15 +144,27 @@ class Intake:
             return
         yield Envelope(self._identity.address(subject, source), stamped)
 
-    def _advances(self, subject: str, source: str, utc_ns: int, received_ns: int) -> bool:
-        """Whether a stamp is later than all before it from this source."""
-        key = (subject, source)
-        newest_ns = self._newest_ns.get(key)
-        if newest_ns is not None and utc_ns <= newest_ns:
-            self._counts["duplicates" if utc_ns == newest_ns else "stamps_back"] += 1
+    def _compare_with_host(self, reading: MessageReading) -> None:
+        message = reading.message
+        if isinstance(message, GnssFix) and message.fix_kind != "none" and reading.stamped_by == "sensor":
+            self._host.state_utc(self._host_ns, message.time_ns)
+
+    def _advances(self, subject: str, source: str, utc_ns: int, by_arrival: bool = False) -> bool:
+        """Whether a stamp comes in order after those before it from this source.
+
+        Stamps by arrival, from a receiver that has no time yet, may be ahead of the receiver's own by as much as
+        the host's clock is: they have a line of their own.
+        """
+        line = self._lines[subject, source, by_arrival]
+        if subject == "pressure" and 0 < utc_ns - (line.newest_ns or 0) < _PRESSURE_INTERVAL_NS:
+            self._counts["pressure_thinned"] += 1
             return False
-        self._newest_ns[key] = utc_ns
-        self._heard_ns[key] = received_ns
+        order = line.take(utc_ns)
+        if order in _DROPPED:
+            self._counts[_DROPPED[order]] += 1
+            return False
+        self._counts["stamps_set_back"] += order == "set_back"
+        self._heard_ns[subject, source] = self._host_ns
         self._rates.count(subject, source, 1, utc_ns)
         return True
 

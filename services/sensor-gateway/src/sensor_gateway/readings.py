@@ -3,11 +3,14 @@
 from collections import Counter
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
-from bootprint.messages import Message, Vector3
+from bootprint.messages import GnssFix, Message, Vector3
 
 ClockId = Hashable
+# Where a stamp in UTC comes from: the sensor told it with a date, the host lent it the date, or all of it.
+StampedBy = Literal["sensor", "host_date", "arrival"]
+StampedFix = tuple[GnssFix, StampedBy]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +32,7 @@ class MessageReading:
     source: str
     clock: ClockId | None
     message: Message
+    stamped_by: StampedBy = "sensor"
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ Protocol = Literal["mavlink", "nmea", "ubx", "nmea+ubx"]
 Place = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{1,64}$")]
 MavlinkId = Annotated[int, msgspec.Meta(ge=0, le=255)]
 Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]
+UtcSeconds = Annotated[float, msgspec.Meta(ge=0.0, lt=4_102_444_800.0)]  # until the year 2100
 
 
 class Sensor(Config, frozen=True):
@@ -88,7 +89,7 @@ class ReplaySource(Device, frozen=True, kw_only=True, tag_field="kind", tag="rep
     path: str
     run: str | None = None
     soldier: str | None = None
-    start_time_s: float | None = None
+    start_time_s: UtcSeconds | None = None
     loop: bool = False
     exit_when_done: bool = False
 

@@ -10,12 +10,13 @@ import typer
 from bootprint.bus import Envelope
 from bootprint.commands.options import DEFAULT_ROUTER
 from bootprint.config import load_computer
-from bootprint.errors import ConfigError
+from bootprint.errors import BusError, ConfigError
 from bootprint.messages import Fix
-from bootprint.topics import Identity
-from bootprint.zenoh_bus import open_bus
+from bootprint.topics import Address, Identity
+from bootprint.zenoh_bus import ZenohBus, open_bus
 
 _SOURCE = "person"
+_LISTENERS = ("fusion", "sa-hub")
 _NS_PER_S = 1_000_000_000
 # Until the router has told a new session who listens, a message would go to nobody.
 _SETTLE_S = 0.5
@@ -50,6 +51,8 @@ def fix(
     Example: bootprint fix --config computer.toml 47.05012 8.30932 --azimuth 90
     """
     identity, known_router = _whose(config, realm, unit, soldier)
+    if azimuth is not None and not -360.0 <= azimuth <= 360.0:
+        raise ConfigError(f"--azimuth {azimuth:g} must be degrees clockwise from true north, 0 to 360")
     try:
         message = Fix(
             time_ns=time.time_ns() if at is None else round(at * _NS_PER_S),
@@ -82,9 +85,18 @@ def _whose(
     raise ConfigError("whose place is it? Give --config computer.toml, or --realm, --unit and --soldier")
 
 
+def _check_somebody_listens(bus: ZenohBus, address: Address, router: str) -> None:
+    """BusError unless the soldier's fusion runs, or a hub that holds places itself (a command post's)."""
+    if not any(bus.alive(address.with_subject("health", service).key) for service in _LISTENERS):
+        raise BusError(
+            f"neither {' nor '.join(_LISTENERS)} of {address.soldier} runs at {router}: nobody to tell"
+        )
+
+
 def _publish(envelope: Envelope, router: str) -> None:
     bus = open_bus(router)
     try:
+        _check_somebody_listens(bus, envelope.address, router)
         time.sleep(_SETTLE_S)
         bus.publish(envelope)
     finally:

@@ -11,8 +11,8 @@ from bootprint.topics import Topic, parse_key
 
 RateState = Literal["ok", "slow", "fast", "silent", "event", "unknown", "unreadable"]
 WINDOW_NS = 10_000_000_000
-TOLERANCE = 0.2
 SILENT_PERIODS = 3.0
+SILENT_AT_LEAST_S = 2.0  # fused positions lag behind the samples they come from
 _NS_PER_S = 1_000_000_000
 
 
@@ -27,9 +27,9 @@ _STAMP = msgspec.msgpack.Decoder(_Stamp)
 class KeyRate:
     """One row: rates over the last ten seconds of event time, None where there are too few messages.
 
-    States: ``slow`` and ``fast`` are a fifth off the expected rate, ``silent`` has said nothing for three
-    periods, ``event`` has no expected rate, ``unknown`` is no key of this version, ``unreadable`` carries no
-    time in its newest message.
+    States: ``slow`` and ``fast`` are off the expected rate by more than the topic's tolerance, ``silent`` has
+    said nothing for three periods and two seconds, ``event`` has no expected rate, ``unknown`` is no key of this
+    version, ``unreadable`` carries no time in its newest message.
     """
 
     key: str
@@ -97,9 +97,11 @@ class RateMeter:
         expected_hz = heard.topic.rate_hz
         if expected_hz is None:
             return "event"
-        if (self._newest_ns - heard.window[-1][0]) / _NS_PER_S > SILENT_PERIODS / expected_hz:
+        quiet_s = (self._newest_ns - heard.window[-1][0]) / _NS_PER_S
+        if quiet_s > max(SILENT_PERIODS / expected_hz, SILENT_AT_LEAST_S):
             return "silent"
-        if rate_hz is None or abs(rate_hz / expected_hz - 1.0) <= TOLERANCE:
+        most = 1.0 + heard.topic.tolerance
+        if rate_hz is None or expected_hz / most <= rate_hz <= expected_hz * most:
             return "ok"
         return "slow" if rate_hz < expected_hz else "fast"
 

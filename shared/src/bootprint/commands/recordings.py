@@ -15,7 +15,7 @@ from bootprint.errors import ConfigError, RecordingError
 from bootprint.recording import Recorder, Recording
 from bootprint.salvage import Salvage
 from bootprint.stopping import Stop
-from bootprint.topics import BY_SUBJECT, TOPICS, VERSION, parse_key
+from bootprint.topics import BY_SUBJECT, TOPICS, VERSION, check_part, parse_key
 from bootprint.zenoh_bus import ZenohBus, open_bus
 
 _FLUSH_S = 1.0
@@ -55,10 +55,18 @@ def record(
         try:
             with Recorder(out, overwrite=overwrite) as recorder:
                 stop.restart()
-                _record(bus, selector or f"{realm}/{VERSION}/**", recorder, stop)
+                _record(bus, selector or f"{_realm_part(realm)}/{VERSION}/**", recorder, stop)
         finally:
             bus.close()
     typer.echo(f"{out}: {recorder.messages} messages, {out.stat().st_size} bytes")
+
+
+def _realm_part(realm: str) -> str:
+    """A realm's id, or ``*`` for all; ConfigError if it cannot be one."""
+    try:
+        return realm if realm == "*" else check_part("--realm", realm)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
 
 
 def _record(bus: ZenohBus, selector: str, recorder: Recorder, stop: Stop) -> None:

@@ -14,6 +14,8 @@ from bootprint.messages import Vector3, symmetric
 from fusion.config import FeetConfig
 from fusion.state import Array
 
+_LARGEST = 1e6  # m², rad²: of a step that could have ended anywhere within a kilometre
+
 
 def rotate(yaw_rad: float, vector: Vector3) -> Vector3:
     """A vector turned counter-clockwise about up."""
@@ -50,8 +52,10 @@ def step_jacobian(pose: Array) -> Array:
 
 
 def step_covariance(triangle: tuple[float, ...]) -> Array | None:
-    """The step's own covariance (4, 4); None if it is none (negative, or far from positive semidefinite)."""
+    """The step's own covariance (4, 4); None if it is none (negative, beyond reason, not positive semidefinite)."""
     covariance = symmetric(triangle)
+    if np.abs(covariance).max() > _LARGEST:
+        return None
     scale = float(np.trace(covariance))
     if scale < 0.0 or np.linalg.eigvalsh(covariance)[0] < -1e-9 * max(scale, 1e-12):
         return None

@@ -24,20 +24,25 @@ def has_position(fix: GnssFix) -> bool:
 def horizontal_sigma_m(fix: GnssFix, config: GnssConfig) -> float | None:
     """One sigma of each horizontal axis, m: the receiver's own figure, else HDOP times UERE, else None.
 
-    A stated horizontal accuracy counts whole for each axis, which is conservative by up to √2.
+    A stated horizontal accuracy counts whole for each axis, which is conservative by up to √2. One that is beyond
+    the range of fixes is none.
     """
     if fix.horizontal_accuracy_m is not None:
-        return max(fix.horizontal_accuracy_m, config.accuracy_floor_m)
+        return _believable(fix.horizontal_accuracy_m, config.accuracy_floor_m, config)
     if fix.hdop is not None and fix.hdop > 0.0:
-        return max(fix.hdop * config.uere_m, config.accuracy_floor_m)
+        return _believable(fix.hdop * config.uere_m, config.accuracy_floor_m, config)
     return None
+
+
+def _believable(sigma_m: float, floor_m: float, config: GnssConfig) -> float | None:
+    return max(sigma_m, floor_m) if sigma_m <= 1000.0 * config.max_range_km else None
 
 
 def vertical_sigma_m(fix: GnssFix, config: GnssConfig) -> float | None:
     """One sigma of the height, m; None if height or its accuracy is unknown."""
     if fix.height_m is None or fix.vertical_accuracy_m is None:
         return None
-    return max(fix.vertical_accuracy_m, config.vertical_floor_m)
+    return _believable(fix.vertical_accuracy_m, config.vertical_floor_m, config)
 
 
 def correlation_inflation(since_last_s: float, correlation_s: float) -> float:

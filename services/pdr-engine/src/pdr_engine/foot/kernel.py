@@ -92,8 +92,10 @@ def _shaking(s: Record) -> float:
 @compiled
 def _turning(s: Record, at: int) -> float:
     """Size of the angular rate, rad/s."""
-    place = at & MASK
-    return math.sqrt(s.gyro[place, 0] ** 2 + s.gyro[place, 1] ** 2 + s.gyro[place, 2] ** 2)
+    square = 0.0
+    for axis in range(3):
+        square += (s.gyro[at & MASK, axis] - s.bias[axis]) ** 2
+    return math.sqrt(square)
 
 
 @compiled
@@ -162,6 +164,21 @@ def _invert(S: Record) -> None:
 
 
 @compiled
+def _stance_variance(s: Record, p: Record, at: int) -> float:
+    """Variance of the sole's velocity in one update at `UPDATE_INTERVAL_S`, (m/s)²."""
+    variance: float = p.velocity_sigma**2 + (p.learned_noise * s.sigma[at & MASK]) ** 2
+    return variance
+
+
+@compiled
+def creep(s: Record, p: Record, at: int, dt: float) -> None:
+    """What zero-velocity updates hide: the foot's place wanders by a velocity σ that lasts a while."""
+    variance = s.sigma[at & MASK] ** 2 * p.hidden_motion * dt
+    for axis in range(POSITION, POSITION + 3):
+        s.P[axis, axis] += variance
+
+
+@compiled
 def zero_velocity(s: Record, p: Record, at: int, dt: float) -> None:
     """The sole stands still: update with its velocity 0.
 
@@ -169,7 +186,7 @@ def zero_velocity(s: Record, p: Record, at: int, dt: float) -> None:
     The covariance stays symmetric by construction: P −= (P·Hᵀ)·S⁻¹·(P·Hᵀ)ᵀ, computed for one triangle.
     """
     y = _measurement(s, at)
-    _innovation_inverse(s, p.velocity_sigma**2 * UPDATE_INTERVAL_S / dt)
+    _innovation_inverse(s, _stance_variance(s, p, at) * UPDATE_INTERVAL_S / dt)
     P, C, K, S = s.P, s.cross, s.gain, s.S
     nis = 0.0
     for k in range(3):

@@ -15,6 +15,7 @@ from pdr_engine.foot.settings import METHODS, FootSettings
 RING = 2048
 MASK = RING - 1
 STATES = 12
+FEATURES, HIDDEN = 20, 10  # of the learned detector
 POSITION, VELOCITY, ATTITUDE, LEVER = (
     0,
     3,
@@ -25,7 +26,7 @@ HEADING = ATTITUDE + 2  # rotation error about the vertical
 ALIGNING, RUNNING = 0, 1
 CLIP_LAG_NS = 35_000_000  # look-ahead of the cleaning stage
 LATENCY_NS = 95_000_000  # look-ahead of the whole: the house allows 100 ms
-STANCE_END_NS = 30_000_000  # a stance has ended when nothing within this time belongs to it
+STANCE_END_NS = 20_000_000  # a stance has ended when nothing within this time belongs to it
 GAP_NS = 50_000_000
 LONG_GAP_NS = 1_000_000_000
 NS = 1e-9
@@ -37,6 +38,7 @@ STATE = np.dtype(
         ("start", "i8"),  # first sample of this alignment
         ("head", "i8"),  # samples accepted
         ("clean", "i8"),  # samples whose values are final and whose detector windows have been looked at
+        ("looked", "i8"),  # samples that the learned detector has judged
         ("done", "i8"),  # samples the filter has used
         ("unbroken", "i8"),  # first sample after the last gap
         ("aligned", "i8"),  # 1 once the attitude's reference is known
@@ -48,10 +50,14 @@ STATE = np.dtype(
         ("gyro", "f8", (RING, 3)),
         ("clipped", "u1", (RING, 3)),
         ("still", "u1", RING),
+        ("sums", "f8", (RING, 8)),  # running sums for the learned detector
+        ("sigma", "f8", RING),  # scale of the foot's velocity, m/s, if learned
         ("doubt", "f8", RING),  # detector's statistic over its threshold: below 1 is stance
         # detector
         ("last_still_ns", "i8"),  # end of the newest window that was stance
         ("calm_since_ns", "i8"),
+        ("interval_s", "f8"),  # running mean of the sampling interval
+        ("features", "f8", FEATURES),
         # filter: nominal state, covariance of the error state, work space
         ("position", "f8", 3),
         ("velocity", "f8", 3),
@@ -126,6 +132,7 @@ _FLOATS = (
     # filter
     *("accel_noise", "gyro_noise", "accel_scale", "gyro_scale", "velocity_sigma", "gate"),
     *("lever_sigma", "lever_walk", "clip_rate", "clip_noise", "gap_accel", "gap_rate", "max_speed"),
+    *("learned_noise", "hidden_motion", "step_scale"),
     # detector
     *("accel_weight", "gyro_weight", "threshold", "growth_rate", "growth_hold"),
     # alignment
@@ -135,7 +142,7 @@ _FLOATS = (
 _INTEGERS = ("method", "window_ns", "calm_hold_ns", "still_window_ns", "patience_ns", "stop_ns", "report_ns")
 PARAMETERS = np.dtype([(name, "f8") for name in _FLOATS] + [(name, "i8") for name in _INTEGERS], align=True)
 
-ADAPTIVE, SHOE, GYRO, DIFFERENTIAL, ARED = range(5)
+LEARNED, ADAPTIVE, SHOE, GYRO, DIFFERENTIAL, ARED = range(6)
 
 
 def _ns(seconds: float) -> int:
@@ -145,6 +152,7 @@ def _ns(seconds: float) -> int:
 def _detector_values(settings: FootSettings) -> dict[str, float]:
     d = settings.detector
     thresholds = {
+        "learned": d.learned_sigma_m_s,
         "adaptive": d.adaptive_threshold,
         "shoe": d.shoe_threshold,
         "gyro": d.gyro_rms_rad_s**2,
@@ -197,6 +205,9 @@ def _filter_values(settings: FootSettings) -> dict[str, float]:
         "gap_accel": f.gap_accel_m_s2,
         "gap_rate": f.gap_rate_rad_s,
         "max_speed": f.max_speed_m_s,
+        "learned_noise": f.learned_noise,
+        "hidden_motion": f.hidden_motion_s,
+        "step_scale": f.step_scale,
         "report_ns": _ns(settings.standing_report_s),
     }
 

@@ -105,6 +105,12 @@ class FootNavigator:
         """Counts since the start: samples accepted and dropped, gaps, clipped peaks, stances, realignments."""
         return {name: int(self._state[name][0]) for name in COUNTERS}
 
+    @property
+    def gyro_bias_rad_s(self) -> Float64Array:
+        """The gyro bias as it is known now, sensor axes, shape (3,)."""
+        bias: Float64Array = self._state["bias"][0].copy()
+        return bias
+
     def _feed(self, count: int, *, ends: bool) -> FootEstimates:
         feed(self._state, self._parameters, self._batch, count, ends, self._estimates, self._steps)
         estimates, steps = self._made

@@ -9,9 +9,10 @@ from typing import Annotated, Literal
 import msgspec
 
 from bootprint.config import Config
+from pdr_engine.foot.presets import REFERENCE, Sensor, alignment_for, filter_for
 
-Method = Literal["adaptive", "shoe", "gyro", "differential", "ared"]
-METHODS: tuple[str, ...] = ("adaptive", "shoe", "gyro", "differential", "ared")
+Method = Literal["learned", "adaptive", "shoe", "gyro", "differential", "ared"]
+METHODS: tuple[str, ...] = ("learned", "adaptive", "shoe", "gyro", "differential", "ared")
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
@@ -25,7 +26,9 @@ class DetectorSettings(Config, frozen=True):
     shoe_accel_sigma_m_s2: Positive = 0.00098
     shoe_gyro_sigma_rad_s: Positive = 8.7e-5
     shoe_threshold: Positive = 8.5e7  # the fixed threshold of pyshoe
-    # The default: SHOE whose threshold waits after a zero-velocity update and then grows exponentially.
+    # The default: a small network tells how fast the foot may be moving; slower than this is stance.
+    learned_sigma_m_s: Positive = 0.14
+    # SHOE whose threshold waits after a zero-velocity update and then grows exponentially.
     adaptive_threshold: Positive = 1e7
     adaptive_hold_s: NonNegative = 0.5
     adaptive_rate_per_s: NonNegative = 3.0
@@ -46,13 +49,13 @@ class AlignmentSettings(Config, frozen=True):
     window_s: Positive = 0.25
     patience_s: Positive = 1.0  # without such a window by then, align on the quietest moment
     accel_std_m_s2: Positive = 0.12
-    gyro_std_rad_s: Positive = 0.02
+    gyro_std_rad_s: Positive = 0.05
     rate_rad_s: Positive = 0.02  # a mean rate above this is a turn, not a bias (four of its sigmas)
     gravity_tolerance_m_s2: Positive = 0.5
     tilt_sigma_rad: Positive = 0.01
     quiet_tilt_sigma_rad: Positive = 0.03  # 0.3 m/s² of motion taken for gravity
-    sway_rad: Positive = 0.0015  # a standing foot rocks by this much: a mean over T is a bias ± sway/T
-    bias_sigma_rad_s: Positive = 0.005  # before anything is known
+    sway_rad: Positive = 0.0008  # a standing foot rocks by this much: a mean over T is a bias ± sway/T
+    bias_sigma_rad_s: Positive = 0.006  # before anything is known
     bias_walk_rad_s_sqrt_s: NonNegative = 2e-5
     stop_s: Positive = 0.5  # a stop this long re-estimates the gyro bias
 
@@ -60,19 +63,25 @@ class AlignmentSettings(Config, frozen=True):
 class FilterSettings(Config, frozen=True):
     """Noise of the error-state filter."""
 
-    accel_noise_m_s2_sqrt_hz: Positive = 0.035
+    accel_noise_m_s2_sqrt_hz: Positive = 0.015
     gyro_noise_rad_s_sqrt_hz: Positive = 0.0006
     # What scale errors, bandwidth and shocks add: this part of the force (without gravity) and of the rate.
     accel_scale_sqrt_s: NonNegative = 0.006
-    gyro_scale_sqrt_s: NonNegative = 0.0
+    gyro_scale_sqrt_s: NonNegative = 0.001
     zero_velocity_sigma_m_s: Positive = (
         0.01  # of one update at 200 Hz; scaled so that other rates weigh the same
     )
-    gate: Positive = 5.0  # innovations beyond this many sigmas inflate the measurement's noise
+    # The learned detector's σ counts this often in the noise of an update: updates a few ms apart err alike.
+    learned_noise: NonNegative = 3.0
+    hidden_motion_s: NonNegative = (
+        0.3  # what a foot creeps by in stance: a velocity of σ, for this long alike
+    )
+    step_scale: NonNegative = 0.01  # part of a step's length that no noise explains: scale errors, sole, shoe
+    gate: Positive = 3.0  # innovations beyond this many sigmas inflate the measurement's noise
     lever_sigma_m: NonNegative = 0.1  # still point of the sole to sensor; 0 leaves a plain 9-state filter
     lever_walk_m_sqrt_s: NonNegative = 0.0
     clip_rad_s: Positive = 6.0  # no gyro of this class clips below
-    clip_noise_rad_s_sqrt_hz: NonNegative = 0.07  # 1 rad/s a sample at 200 Hz
+    clip_noise_rad_s_sqrt_hz: NonNegative = 0.12  # 1.7 rad/s a sample at 200 Hz
     gap_accel_m_s2: Positive = 10.0  # what a foot may do unseen in a gap of the stream
     gap_rate_rad_s: Positive = 2.0
     max_speed_m_s: Positive = 15.0
@@ -81,8 +90,14 @@ class FilterSettings(Config, frozen=True):
 class FootSettings(Config, frozen=True):
     """All settings of one foot's navigator."""
 
-    method: Method = "adaptive"
+    method: Method = "learned"
+    # Its noise takes the place of the reference's, in terms that are not set by hand.
+    sensor: Sensor = REFERENCE
     standing_report_s: Positive = 0.5
     detector: DetectorSettings = DetectorSettings()
     alignment: AlignmentSettings = AlignmentSettings()
     filter: FilterSettings = FilterSettings()
+
+    def __post_init__(self) -> None:
+        msgspec.structs.force_setattr(self, "alignment", alignment_for(self.sensor, self.alignment))
+        msgspec.structs.force_setattr(self, "filter", filter_for(self.sensor, self.filter))

@@ -10,14 +10,17 @@ from typing import Any
 
 from pdr_engine.foot.alignment import blend_bias, remember_bias, try_align, unrest, verified_still
 from pdr_engine.foot.compiled import Record, compiled
+from pdr_engine.foot.features import accumulate
 from pdr_engine.foot.intake import AFTER_LONG_GAP, DROPPED, judge, mend, push
-from pdr_engine.foot.kernel import forget_place, mechanise, propagate, zero_velocity
+from pdr_engine.foot.kernel import creep, forget_place, mechanise, propagate, zero_velocity
+from pdr_engine.foot.learned import look
 from pdr_engine.foot.memory import (
     ALIGNING,
     CLIP_LAG_NS,
     GAP_NS,
     HEADING,
     LATENCY_NS,
+    LEARNED,
     MASK,
     NS,
     POSITION,
@@ -28,6 +31,7 @@ from pdr_engine.foot.quaternion import assign, twist, wrapped
 from pdr_engine.foot.stance import detect
 
 STOP_BLOCK_NS = 500_000_000  # a stop is verified block by block
+STRIDE_AT_LEAST_NS = 350_000_000  # the strides of a sprint take 0.4 s: what ends sooner is not a step yet
 
 
 @compiled
@@ -80,7 +84,7 @@ def _break_off(s: Record) -> None:
 def _realign(s: Record, start: int) -> None:
     """Wait for an alignment with the samples from ``start`` on."""
     s.mode = ALIGNING
-    s.start = s.done = s.clean = start
+    s.start = s.done = s.clean = s.looked = start
     s.unbroken = max(s.unbroken, start)
     s.in_stance = 0
     s.stop_samples = 0
@@ -104,9 +108,13 @@ def _advance(s: Record, p: Record, estimates: Any, steps: Any) -> None:
         try_align(s, p, False)
     while s.mode == RUNNING and s.clean < s.head and (s.flushing or _age_ns(s, s.clean) > CLIP_LAG_NS):
         mend(s, p, s.clean)
-        detect(s, p, s.clean)
+        accumulate(s, s.clean)
+        if p.method != LEARNED:
+            detect(s, p, s.clean)
         s.clean += 1
     while s.mode == RUNNING and s.done < s.clean and (s.flushing or _age_ns(s, s.done) > LATENCY_NS):
+        if p.method == LEARNED:
+            look(s, p, s.time_ns[s.done & MASK] + STANCE_END_NS)
         _use(s, p, s.done, estimates, steps)
 
 
@@ -121,6 +129,7 @@ def _use(s: Record, p: Record, at: int, estimates: Any, steps: Any) -> None:
         mechanise(s, at, dt)
         propagate(s, p, at, dt, dt > GAP_NS * NS)
         if s.still[place]:
+            creep(s, p, at, dt)
             zero_velocity(s, p, at, dt)
     if _diverged(s, p):
         _recover(s, at)
@@ -225,8 +234,9 @@ def _watch_stance(s: Record, p: Record, at: int, steps: Any) -> None:
     s.stance_doubt += s.doubt[place]
     s.stance_samples += 1
     goes_on_long = now_ns - max(s.stance_since_ns, s.step_time_ns) >= p.report_ns
-    if goes_on_long or _stance_ends(s, at):
-        _hand_over(s, at, steps)
+    long_enough = now_ns - s.step_time_ns >= STRIDE_AT_LEAST_NS
+    if goes_on_long or (long_enough and _stance_ends(s, at)):
+        _hand_over(s, p, at, steps)
 
 
 @compiled
@@ -242,7 +252,7 @@ def _stance_ends(s: Record, at: int) -> bool:
 
 
 @compiled
-def _hand_over(s: Record, at: int, steps: Any) -> None:
+def _hand_over(s: Record, p: Record, at: int, steps: Any) -> None:
     """Write the step from the last hand-over to sample ``at``, and reset what the step has taken along."""
     row = steps[s.steps]
     row.start_time_ns = s.step_time_ns
@@ -253,7 +263,7 @@ def _hand_over(s: Record, at: int, steps: Any) -> None:
     row.displacement_m[1] = cosine * y - sine * x
     row.displacement_m[2] = s.position[2] - s.step_position[2]
     row.heading_change_rad = wrapped(s.yaw - s.step_yaw)
-    _write_covariance(s, row, cosine, sine)
+    _write_covariance(s, p, row, cosine, sine)
     row.swing_ns = s.step_swing_ns
     row.doubt = s.stance_doubt / max(1, s.stance_samples)
     row.realigned = s.realigned != 0
@@ -262,13 +272,18 @@ def _hand_over(s: Record, at: int, steps: Any) -> None:
 
 
 @compiled
-def _write_covariance(s: Record, row: Record, cosine: float, sine: float) -> None:
-    """The 4x4 covariance of (forward, left, up, heading): the filter's, turned into the step's axes."""
+def _write_covariance(s: Record, p: Record, row: Record, cosine: float, sine: float) -> None:
+    """The 4x4 covariance of (forward, left, up, heading): the filter's in the step's axes, and scale errors."""
+    square = 0.0
     for i in range(4):
         a = HEADING if i == 3 else POSITION + i
         for j in range(4):
             b = HEADING if j == 3 else POSITION + j
             row.covariance[i, j] = s.P[a, b]
+    for axis in range(3):
+        square += row.displacement_m[axis] ** 2
+    for axis in range(3):
+        row.covariance[axis, axis] += p.step_scale**2 * square
     for j in range(4):
         x, y = row.covariance[0, j], row.covariance[1, j]
         row.covariance[0, j], row.covariance[1, j] = cosine * x + sine * y, cosine * y - sine * x

@@ -33,6 +33,11 @@ class TokenBucket:
         self._now_ns += elapsed_ns
         self._level = min(self._level + self.rate_bits_per_s * elapsed_ns, self.depth_bits * NS_PER_S)
 
+    def set_back(self, by_ns: int) -> None:
+        """The clock was set back by so much: nothing is gained by it, and nothing lost."""
+        if self._now_ns is not None:
+            self._now_ns -= by_ns
+
     def take(self, air_bytes: int, now_ns: int) -> bool:
         """Pay for ``air_bytes`` (link header included); False, and nothing spent, if that is too much now."""
         self.fill(now_ns)

@@ -1,17 +1,21 @@
 """Counters that never repeat: blocks reserved on disk before the first number of them is used.
 
-A nonce used twice under one key gives the key stream away, so after a power cut no number may come again. Every
-start takes a fresh epoch; within it, blocks of counters. A block is on disk, synced, before it is handed out.
-Where the file is lost, the host clock (minutes since 2020) makes an epoch beyond all earlier ones.
+A nonce used twice under one key gives the key stream away, so after a power cut no number may come again. A block
+is on disk, synced, before it is handed out.
+
+An epoch is a second of the host clock, counted from 2020, and is handed out when that second is over: whoever takes
+one later, even with the file lost, takes a later one. So every start takes a fresh epoch, unless the clock has not
+passed the last one (it was set back): then the next block of that epoch, for epochs never run ahead of the clock.
 """
 
 import fcntl
 import os
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Annotated, Final, Protocol
 
 import msgspec
 
@@ -21,7 +25,7 @@ from sa_hub.radio.layout import COUNTER_BITS, EPOCH_BITS
 BLOCK: Final = 1024
 EPOCHS: Final = 1 << EPOCH_BITS
 COUNTERS: Final = 1 << COUNTER_BITS
-_YEAR_2020_MINUTES: Final = 26_297_280  # minutes from 1970 to 2020-01-01 UTC
+_YEAR_2020_S: Final = 1_577_836_800  # 2020-01-01 UTC
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,42 +61,88 @@ class MemoryCounters:
 class _Reserved(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The file's content: every counter of earlier epochs, and those below ``end`` of this one, are gone."""
 
-    epoch: int
-    end: int
+    epoch: Annotated[int, msgspec.Meta(ge=0, lt=EPOCHS)]
+    end: Annotated[int, msgspec.Meta(ge=0)]
 
 
 class FileCounters:
-    """Counters reserved in a file; several processes on one file never get the same block."""
+    """Counters reserved in a file; several processes on one file never get the same block.
 
-    def __init__(self, path: Path, host_time_s: Callable[[], float], block: int = BLOCK) -> None:
+    ``earlier_life``: a file that only a hub which had counters can have written. If it is there and the counters
+    are not, they were lost, and a clock that was set back meanwhile would bring nonces again: ConfigError.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        host_time_s: Callable[[], float],
+        block: int = BLOCK,
+        *,
+        earlier_life: Path | None = None,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
         self._path = path
         self._host_time_s = host_time_s
         self._block = block
+        self._earlier_life = earlier_life
+        self._sleep = sleep
         self._mine: _Reserved | None = None
 
     def reserve(self) -> Block:
-        """Go on in our epoch if it is still the file's last, else take a fresh one; on disk before it returns."""
+        """Go on in our epoch if it is still the file's last, else take a fresh one; on disk before it returns.
+
+        Waits up to a second until the epoch's own second is over.
+        """
         with self._locked():
             stored = self._read()
-            room = stored is not None and stored.end + self._block <= COUNTERS
-            if stored is not None and room and (stored == self._mine or stored.epoch + 1 >= EPOCHS):
-                block = Block(stored.epoch, stored.end, stored.end + self._block)
-            else:
-                block = Block(self._fresh_epoch(stored), 0, self._block)
+            block = self._first(self._checked_clock()) if stored is None else self._next(stored)
             reserved = _Reserved(block.epoch, block.end)
             self._write(reserved)
             self._mine = reserved
+        self._outlast(block.epoch)
         return block
 
-    def _fresh_epoch(self, stored: _Reserved | None) -> int:
-        minutes = int(self._host_time_s() // 60) - _YEAR_2020_MINUTES
-        by_clock = minutes if 0 <= minutes < EPOCHS - 1 else 0
-        epoch = max(by_clock, 0 if stored is None else stored.epoch + 1)
-        if epoch >= EPOCHS:
+    def _first(self, clock_s: float) -> Block:
+        return Block(int(clock_s), 0, self._block)
+
+    def _next(self, stored: _Reserved) -> Block:
+        room = stored.end + self._block <= COUNTERS
+        clock_s = self._clock_s()
+        fresh = stored.epoch < int(clock_s) < EPOCHS
+        if room and (stored == self._mine or not fresh):
+            return Block(stored.epoch, stored.end, stored.end + self._block)
+        if fresh:
+            return self._first(clock_s)
+        if stored.epoch + 1 >= EPOCHS:
             raise ConfigError(
                 f"{self._path}: all radio counters are used up; make a new group key, then delete this"
             )
-        return epoch
+        return Block(stored.epoch + 1, 0, self._block)
+
+    def _clock_s(self) -> float:
+        """Seconds since 2020."""
+        return self._host_time_s() - _YEAR_2020_S
+
+    def _checked_clock(self) -> float:
+        """The clock where no counters are stored; ConfigError if nothing vouches for fresh nonces then."""
+        if self._earlier_life is not None and self._earlier_life.exists():
+            raise ConfigError(
+                f"{self._path}: the radio counters are lost, but {self._earlier_life.name} shows an earlier life; "
+                f"restore the file, or make a new group key and delete {self._earlier_life.name}"
+            )
+        clock_s = self._clock_s()
+        if not 0.0 <= clock_s < EPOCHS:
+            raise ConfigError(
+                f"{self._path}: no radio counters yet, and this computer's clock is not between 2020 and 2054; "
+                "set it before the first start"
+            )
+        return clock_s
+
+    def _outlast(self, epoch: int) -> None:
+        """Wait until the epoch's second is over, so that nobody who starts after us can take it."""
+        left_s = epoch + 1 - self._clock_s()
+        if 0.0 < left_s <= 1.0:
+            self._sleep(left_s)
 
     def _read(self) -> _Reserved | None:
         try:
@@ -101,7 +151,8 @@ class FileCounters:
             return None
         except (msgspec.MsgspecError, OSError) as error:
             raise ConfigError(
-                f"{self._path}: damaged radio counters ({error}); delete the file and make a new group key"
+                f"{self._path}: damaged radio counters ({error}); restore the file, "
+                f"or make a new group key and delete all of {self._path.stem}.*"
             ) from error
 
     def _write(self, reserved: _Reserved) -> None:
@@ -127,7 +178,7 @@ class FileCounters:
 
 def write_synced(path: Path, data: bytes) -> None:
     """Replace the file so that after a power cut it is the old one or the new one, and now is the new one."""
-    fresh = path.with_suffix(".new")
+    fresh = path.with_name(f"{path.name}.new")
     with fresh.open("wb") as file:
         file.write(data)
         file.flush()

@@ -8,8 +8,8 @@ from typing import Final
 from sa_hub.radio.bits import BitReader, BitWriter
 
 VERSION: Final = 1
-EPOCH_BITS: Final = 24
-COUNTER_BITS: Final = 24
+EPOCH_BITS: Final = 30
+COUNTER_BITS: Final = 18
 COUNTER_LOW_BITS: Final = 8
 
 
@@ -63,7 +63,7 @@ HEADER: Final = (
     Field("sender", 10, "the sending hub's number in the roster"),
     Field("full", 1, "1: epoch and the counter's high bits follow"),
     Field("counter_low", COUNTER_LOW_BITS, "the frame counter's low bits"),
-    Field("epoch", EPOCH_BITS, "the sender's epoch on this net, new at each start", (("full", 1),)),
+    Field("epoch", EPOCH_BITS, "the sender's epoch on this net, seconds since 2020", (("full", 1),)),
     Field("counter_high", COUNTER_BITS - COUNTER_LOW_BITS, "the counter's high bits", (("full", 1),)),
 )
 

@@ -27,6 +27,10 @@ class LinkMeter:
         """Something came in, good or bad."""
         self.bytes_received += air_bytes
 
+    def set_back(self, by_ns: int) -> None:
+        """The clock was set back by so much."""
+        self._recent = deque((time_ns - by_ns, bits) for time_ns, bits in self._recent)
+
     def bits_per_s(self, now_ns: int) -> float:
         """Bits sent in the last 10 s of event time, per second."""
         while self._recent and self._recent[0][0] <= now_ns - WINDOW_NS:

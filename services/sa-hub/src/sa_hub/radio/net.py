@@ -5,6 +5,7 @@ reports only when the bucket can pay for it, so nothing stale ever queues.
 """
 
 from collections.abc import Collection, Sequence
+from typing import Final
 
 from bootprint.errors import BootprintError
 from bootprint.messages import LinkReport
@@ -21,6 +22,8 @@ from sa_hub.radio.seal import Opener, Sealer, read_header
 from sa_hub.radio.squad import partition
 from sa_hub.settings import LinkProfile
 
+_UNOPENED_AT_LEAST: Final = 3  # frames; the first ones of a sender may have been missed
+
 
 class RadioNet:
     """The radio side of one link; contents in and out, sealed frames out and in."""
@@ -34,6 +37,7 @@ class RadioNet:
         self.outbox = Outbox()
         self.meter = LinkMeter()
         self.counter_faults = 0
+        self.faults = 0
         self._number = number
         self._codec = codec
         self._sealer = sealer
@@ -54,6 +58,12 @@ class RadioNet:
             return None
         self.meter.frames_received += 1
         return heard
+
+    @property
+    def opens_nothing(self) -> bool:
+        """Whether frames of the roster's senders are heard and not one of them could be opened."""
+        sealed = self.meter.rejected["forged"] + self.meter.rejected["unknown_epoch"]
+        return self.opener.opened == 0 and sealed >= _UNOPENED_AT_LEAST
 
     def _open(
         self, datagram: bytes, now_ns: int, known: Collection[int], *, exercise: bool
@@ -112,7 +122,7 @@ class RadioNet:
 
     def _payload_limit(self) -> int:
         """Bytes left for a payload in the longest frame that link and bucket can ever let through."""
-        by_bucket = self._bucket.depth_bits // 8 - self.profile.header_bytes
+        by_bucket = self._bucket.depth_bits // (8 * self.profile.copies) - self.profile.header_bytes
         return min(self.profile.mtu_bytes, by_bucket) - FULL_HEADER_BYTES - self._sealer.tag_bytes
 
     def _encode(self, content: Content) -> tuple[Kind, bytes]:
@@ -121,7 +131,7 @@ class RadioNet:
     def _transmit(self, content: Content, now_ns: int) -> bytes | None:
         """Seal and pay; None if the bucket cannot pay yet."""
         kind, payload = self._encode(content)
-        air_bytes = len(payload) + self._sealer.overhead_bytes(now_ns) + self.profile.header_bytes
+        air_bytes = self.profile.air_bytes(len(payload) + self._sealer.overhead_bytes(now_ns))
         if not self._bucket.take(air_bytes, now_ns):
             return None
         self.meter.sent(air_bytes, now_ns)
@@ -139,6 +149,11 @@ class RadioNet:
     def post(self, notice: Notice, now_ns: int) -> None:
         """Queue a notice for this net."""
         self.outbox.post(notice, now_ns)
+
+    def set_back(self, by_ns: int) -> None:
+        """The clock was set back by so much: all that is held in its time goes with it."""
+        for part in (self._bucket, self._sealer, self.scheduler, self.outbox, self.meter):
+            part.set_back(by_ns)
 
     # -- accounting -------------------------------------------------------------------------------------------
 

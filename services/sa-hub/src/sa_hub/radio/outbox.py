@@ -59,6 +59,11 @@ class Outbox:
                 waiting.pause_ns *= 2
         self._waiting = [waiting for waiting in self._waiting if waiting.left > 0]
 
+    def set_back(self, by_ns: int) -> None:
+        """The clock was set back by so much."""
+        for waiting in self._waiting:
+            waiting.due_ns -= by_ns
+
     def _supersede(self, number: int) -> None:
         self._waiting = [
             waiting

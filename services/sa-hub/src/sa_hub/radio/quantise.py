@@ -23,6 +23,7 @@ SPEEDS_M_S: Final = tuple(0.3 * 1.28**code for code in range(16))
 STANDING_BELOW_M_S: Final = SPEEDS_M_S[0] / 2
 ACCURACIES_M: Final = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 50.0, 1000.0)
 AGE_CODES: Final = 256
+LONGEST_AGE_TICKS: Final = 63 << 6
 MODES: Final[tuple[Mode, ...]] = ("unplaced", "gnss", "boots", "body", "camera", "coasting", "lost")
 
 _FINEST_CELL_DEG: Final = 180.0 / (1 << LATITUDE_BITS)

@@ -10,7 +10,7 @@ early, then later and later (doubling, as the Trickle algorithm of RFC 6206), un
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from bootprint.clock import NS_PER_S
@@ -68,6 +68,14 @@ class Scheduler:
         ):
             return min(policy.confirm_s, policy.heartbeat_s)
         return min(2.0 * belief.silence_s, policy.heartbeat_s)
+
+    def set_back(self, by_ns: int) -> None:
+        """The clock was set back by so much. Of ourselves nobody knows the new time yet: that is news."""
+        self._first_due_ns = None
+        self._beliefs.pop(self._own, None)
+        for number, belief in self._beliefs.items():
+            report = replace(belief.report, time_ns=belief.report.time_ns - by_ns)
+            self._beliefs[number] = replace(belief, report=report)
 
     def due(self, candidates: Sequence[Report], now_ns: int) -> list[Report]:
         """Who is to be reported now, the most urgent first: those due and those nearly so; none while gathering."""

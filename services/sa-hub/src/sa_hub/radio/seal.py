@@ -116,6 +116,10 @@ class Sealer:
         nonce = _nonce(self._sender, epoch, counter)
         return header + self._keys.cipher(self._sender).encrypt(nonce, payload, header)
 
+    def set_back(self, by_ns: int) -> None:
+        """The clock was set back by so much."""
+        self._full_ns -= by_ns
+
     def _is_full(self, now_ns: int) -> bool:
         return self._full_sent < FULL_AT_START or now_ns - self._full_ns >= FULL_EVERY_NS
 

@@ -62,7 +62,7 @@ def offsets_of(report: Report, anchor: Anchor) -> Offsets:
 
 
 def partition(reports: Sequence[Report], resolution: int) -> list[list[Report]]:
-    """Groups that each fit one frame's offsets, in the order given: greedy, the first report leads."""
+    """Groups that each fit one frame's offsets and ages, in the order given: greedy, the first report leads."""
     groups: list[list[Report]] = []
     for report in reports:
         for group in groups:
@@ -76,6 +76,8 @@ def partition(reports: Sequence[Report], resolution: int) -> list[list[Report]]:
 
 def _fits(reports: list[Report], resolution: int) -> bool:
     anchor = anchor_of(reports, resolution)
+    if anchor.tick - min(q.tick_of(report.time_ns) for report in reports) > q.LONGEST_AGE_TICKS:
+        return False
     offsets = [offsets_of(report, anchor) for report in reports]
     return all(
         offset.east <= SPAN_LIMIT and offset.north <= SPAN_LIMIT and (offset.up or 0) <= UP_LIMIT_M

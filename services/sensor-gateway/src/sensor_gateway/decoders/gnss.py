@@ -3,12 +3,11 @@
 from collections import Counter
 from collections.abc import Iterable
 
-from bootprint.messages import GnssFix
 from sensor_gateway.decoders.gnss_frame import NMEA_MARKER, measure_for
 from sensor_gateway.decoders.gnss_nmea import NmeaDecoder
 from sensor_gateway.decoders.gnss_ubx import UbxDecoder
 from sensor_gateway.framing import Framer
-from sensor_gateway.readings import MessageReading, Reading
+from sensor_gateway.readings import MessageReading, Reading, StampedFix
 from sensor_gateway.settings import Device
 
 
@@ -44,12 +43,12 @@ class GnssDecoder:
             readings += self._readings(self._fixes(frame, received_ns))
         return readings
 
-    def _fixes(self, frame: bytes, received_ns: int) -> list[GnssFix]:
+    def _fixes(self, frame: bytes, received_ns: int) -> list[StampedFix]:
         if not frame.startswith(NMEA_MARKER):
             fixes = self._ubx.packet(frame, received_ns)
             self._has_pvt = self._has_pvt or bool(fixes)
             return fixes
         return [] if self._has_pvt else self._nmea.sentence(frame, received_ns)
 
-    def _readings(self, fixes: Iterable[GnssFix]) -> list[Reading]:
-        return [MessageReading(self._source, None, fix) for fix in fixes]
+    def _readings(self, fixes: Iterable[StampedFix]) -> list[Reading]:
+        return [MessageReading(self._source, None, fix, stamped_by) for fix, stamped_by in fixes]

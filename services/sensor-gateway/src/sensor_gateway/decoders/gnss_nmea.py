@@ -13,6 +13,7 @@ from pynmeagps import NMEAReader
 from pynmeagps import exceptions as nmea
 
 from bootprint.messages import FixKind, GnssFix
+from sensor_gateway.readings import StampedFix
 
 _NS_PER_S = 1_000_000_000
 _DAY_NS = 86_400 * _NS_PER_S
@@ -43,8 +44,9 @@ class NmeaDecoder:
         self._newest = ""
         self._last_of_epoch = ""
         self._known_utc_ns: int | None = None
+        self._date_told = False
 
-    def sentence(self, frame: bytes, received_ns: int) -> list[GnssFix]:
+    def sentence(self, frame: bytes, received_ns: int) -> list[StampedFix]:
         """Take one checked sentence; the fixes (none or one) that it completes."""
         try:
             message = NMEAReader.parse(frame)
@@ -61,13 +63,13 @@ class NmeaDecoder:
             self._dimensions = message
         elif message.msgID == "ZDA" and _value(message, "time") is not None and _value(message, "year"):
             date = datetime.date(message.year, message.month, message.day)
-            self._known_utc_ns = _of_date_ns(date) + _of_day_ns(message.time)
+            self._known_utc_ns, self._date_told = _of_date_ns(date) + _of_day_ns(message.time), True
 
-    def _take(self, kind: str, message: Any, received_ns: int) -> list[GnssFix]:
+    def _take(self, kind: str, message: Any, received_ns: int) -> list[StampedFix]:
         time = _value(message, "time")
         if time is None:
             return self._without_time(kind, message, received_ns)
-        fixes: list[GnssFix] = []
+        fixes: list[StampedFix] = []
         if time != self._time:
             fixes = self.finish(received_ns)
             self._last_of_epoch, self._time = self._newest, time
@@ -78,15 +80,15 @@ class NmeaDecoder:
                 fixes += self.finish(received_ns)
         return fixes
 
-    def _without_time(self, kind: str, message: Any, received_ns: int) -> list[GnssFix]:
+    def _without_time(self, kind: str, message: Any, received_ns: int) -> list[StampedFix]:
         """A receiver without time has no fix; that it is alive is told once an epoch, by its GGA."""
         if kind != "GGA":
             return []
         self._counts["fixes_without_time"] += 1
         none = GnssFix(time_ns=received_ns, fix_kind="none", satellites=_value(message, "numSV"))
-        return [*self.finish(received_ns), none]
+        return [*self.finish(received_ns), (none, "arrival")]
 
-    def finish(self, received_ns: int) -> list[GnssFix]:
+    def finish(self, received_ns: int) -> list[StampedFix]:
         """The fix of the epoch so far, if it has not been told yet."""
         epoch, self._epoch = self._epoch, {}
         if self._time is None or not epoch.keys() & {"GGA", "RMC"}:
@@ -94,7 +96,8 @@ class NmeaDecoder:
         self._told = self._time
         self._known_utc_ns = self._utc_ns(self._time, epoch, received_ns)
         try:
-            return [_fix(self._known_utc_ns, epoch, self._dimensions, self._geoid_undulation_m)]
+            fix = _fix(self._known_utc_ns, epoch, self._dimensions, self._geoid_undulation_m)
+            return [(fix, "sensor" if self._date_told else "host_date")]
         except ValueError:
             self._counts["messages_invalid"] += 1
             return []
@@ -103,6 +106,7 @@ class NmeaDecoder:
         """The epoch's UTC: its own date, else the day that puts it nearest to the last known time."""
         date: datetime.date | None = _value(epoch.get("RMC"), "date")
         if date is not None:
+            self._date_told = True
             return _of_date_ns(date) + _of_day_ns(time)
         near_ns = received_ns if self._known_utc_ns is None else self._known_utc_ns
         return near_ns + (_of_day_ns(time) - near_ns + _DAY_NS // 2) % _DAY_NS - _DAY_NS // 2

@@ -9,6 +9,7 @@ from pyubx2 import UBXReader
 from pyubx2 import exceptions as ubx
 
 from bootprint.messages import FixKind, GnssFix
+from sensor_gateway.readings import StampedFix
 
 _NS_PER_S = 1_000_000_000
 _NAV_PVT = b"\x01\x07"
@@ -23,7 +24,7 @@ class UbxDecoder:
     def __init__(self, counts: Counter[str]) -> None:
         self._counts = counts
 
-    def packet(self, frame: bytes, received_ns: int) -> list[GnssFix]:
+    def packet(self, frame: bytes, received_ns: int) -> list[StampedFix]:
         """Take one checked packet; the fixes (none or one) in it."""
         if frame[2:4] != _NAV_PVT:
             return []
@@ -33,13 +34,12 @@ class UbxDecoder:
             self._counts["messages_invalid"] += 1
             return []
 
-    def _fix(self, pvt: Any, received_ns: int) -> GnssFix:
+    def _fix(self, pvt: Any, received_ns: int) -> StampedFix:
         if pvt.validDate and pvt.validTime:
-            time_ns = _utc_ns(pvt)
-        else:
-            self._counts["fixes_without_time"] += 1
-            time_ns = received_ns
-        return _from_pvt(pvt, time_ns)
+            # Before it is fully resolved, the number of leap seconds may be wrong.
+            return _from_pvt(pvt, _utc_ns(pvt)), "sensor" if pvt.fullyResolved else "host_date"
+        self._counts["fixes_without_time"] += 1
+        return _from_pvt(pvt, received_ns), "arrival"
 
 
 def _utc_ns(pvt: Any) -> int:

@@ -4,7 +4,7 @@ Formats are recognised by what is in a file or folder, hardly ever by its name. 
 with a warning; what a reader knows but cannot read is an error.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,7 +77,7 @@ def _load(path: Path) -> Iterator[Run]:
     if path.is_dir():
         yield from _load_folder(path)
     elif path.is_file():
-        yield from _load_files([path], path.parent)
+        yield from _load_files([path], path.parent, named=[path])
     else:
         raise RecordingError(f"{path}: no such file or folder")
 
@@ -94,18 +94,29 @@ def _load_folder(folder: Path) -> Iterator[Run]:
             yield from _load_folder(entry)
 
 
-def _load_files(files: Sequence[Path], folder: Path) -> Iterator[Run]:
+def _read_found(format_: Format, path: Path) -> list[Run]:
+    """The runs of a file nobody named but a folder holds: what is wrong with it must not hide the others."""
+    try:
+        return format_.read(path)
+    except RecordingError as error:
+        structlog.get_logger().warning("recording.skipped", error=str(error))
+        return []
+
+
+def _load_files(files: Sequence[Path], folder: Path, named: Collection[Path] = ()) -> Iterator[Run]:
     unknown: list[str] = []
     for path in files:
         format_ = _format_of(path, FILES)
-        if format_:
+        if format_ is None:
+            unknown.append(path.name)
+        elif path in named:
             yield from format_.read(path)
         else:
-            unknown.append(path.name)
+            yield from _read_found(format_, path)
     if unknown:
-        named = ", ".join(unknown[:_NAMED_AT_MOST])
+        some = ", ".join(unknown[:_NAMED_AT_MOST])
         structlog.get_logger().warning(
-            "recording.unknown_skipped", folder=str(folder), files=named, count=len(unknown)
+            "recording.unknown_skipped", folder=str(folder), files=some, count=len(unknown)
         )
 
 
