@@ -21,7 +21,7 @@ def cross_matrix(v: np.ndarray) -> np.ndarray:
 class Noise:
     """Densities and sigmas, named as the filter's settings."""
 
-    accel: float = 0.015
+    accel: float = 0.012
     gyro: float = 0.0006
     accel_scale: float = 0.006
     gyro_scale: float = 0.001

@@ -254,6 +254,12 @@ def _run(service: Service, context: Context) -> int:
     return context.exit_code
 
 
+def _resident_mb() -> float:
+    """Resident memory of this process (Linux; a child's ru_maxrss would begin with its parent's)."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
 class _Loop:
     """The main loop: inbox, tick, health."""
 
@@ -343,7 +349,7 @@ class _Loop:
                 gauges={
                     **figures.gauges,
                     "cpu_s": usage.ru_utime + usage.ru_stime,
-                    "peak_memory_mb": usage.ru_maxrss / 1024,
+                    "memory_mb": _resident_mb(),
                 },
                 note=figures.note,
             ),

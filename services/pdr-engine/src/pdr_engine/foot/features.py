@@ -17,6 +17,7 @@ NEAR_S, PAST_S, STRIDE_S = 0.04, 0.10, 0.5  # half lengths
 FORCE_FLOOR, RATE_FLOOR, TURN_FLOOR = 3e-3, 1e-4, 1e-3  # of the logarithms: (m/s²)², (rad/s)², (m/s²)²
 LOAD_M_S2 = 3.0
 SWING_FORCE, SWING_RATE = 100.0, 4.0  # energies: (10 m/s²)², (2 rad/s)²
+SHORTEST_S = 1e-4
 MEMORY = 1e-2  # of the running mean of the sampling interval
 REACH = RING - 64
 
@@ -33,6 +34,7 @@ def accumulate(s: Record, at: int) -> None:
     elif at > s.unbroken:
         interval = (s.time_ns[here] - s.time_ns[before]) * NS
         s.interval_s = interval if s.interval_s == 0.0 else s.interval_s + MEMORY * (interval - s.interval_s)
+        s.rate_hz = 1.0 / max(s.interval_s, SHORTEST_S)
     force = rate = 0.0
     for axis in range(3):
         f, w = s.accel[here, axis], s.gyro[here, axis]
@@ -46,9 +48,9 @@ def accumulate(s: Record, at: int) -> None:
 @compiled
 def _window(s: Record, at: int, centre_s: float, half_s: float) -> Mean:
     """Mean over a window about ``at``: force energy, rate energy, |mean force|, mean force, mean rate."""
-    interval = max(s.interval_s, 1e-4)
-    centre = at + math.floor(centre_s / interval + 0.5)
-    half = max(1, math.floor(half_s / interval + 0.5))
+    rate_hz = s.rate_hz
+    centre = at + math.floor(centre_s * rate_hz + 0.5)
+    half = max(1, math.floor(half_s * rate_hz + 0.5))
     oldest = max(s.start, s.unbroken, s.clean - REACH)
     lo = min(max(centre - half, oldest), s.clean - 1)
     hi = min(max(centre + half, oldest), s.clean - 1)

@@ -15,6 +15,7 @@ from pdr_engine.foot.memory import FEATURES, HIDDEN, MASK
 from pdr_engine.foot.weights import BIAS, HIDDEN_BIAS, INPUT, OUTPUT
 
 SWING_M_S = 3.0
+JUDGED_FOR_NS = 7_500_000  # neighbours share a verdict: at 200 Hz every other sample is judged
 
 
 @compiled
@@ -30,14 +31,24 @@ def velocity_scale(s: Record) -> float:
 
 
 @compiled
+def _judged(s: Record, at: int) -> float:
+    """σ of sample ``at``, m/s."""
+    if swings(s, at):
+        return SWING_M_S
+    describe(s, at)
+    return float(velocity_scale(s))
+
+
+@compiled
 def look(s: Record, p: Record, until_ns: int) -> None:
-    """Judge the samples up to time ``until_ns``."""
+    """Judge the samples up to time ``until_ns``: stance or not, and how surely."""
     while s.looked < s.clean and s.time_ns[s.looked & MASK] <= until_ns:
         place = s.looked & MASK
-        s.sigma[place] = SWING_M_S
-        if not swings(s, s.looked):
-            describe(s, s.looked)
-            s.sigma[place] = velocity_scale(s)
+        if s.looked > s.start and s.time_ns[place] - s.judged_ns < JUDGED_FOR_NS:
+            s.sigma[place] = s.sigma[(s.looked - 1) & MASK]
+        else:
+            s.judged_ns = s.time_ns[place]
+            s.sigma[place] = _judged(s, s.looked)
         s.doubt[place] = s.sigma[place] / p.threshold
         s.still[place] = s.doubt[place] < 1.0
         s.looked += 1

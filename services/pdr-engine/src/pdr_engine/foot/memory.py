@@ -38,6 +38,7 @@ STATE = np.dtype(
         ("start", "i8"),  # first sample of this alignment
         ("head", "i8"),  # samples accepted
         ("clean", "i8"),  # samples whose values are final and whose detector windows have been looked at
+        ("judged_ns", "i8"),  # time of the newest verdict of its own
         ("looked", "i8"),  # samples that the learned detector has judged
         ("done", "i8"),  # samples the filter has used
         ("unbroken", "i8"),  # first sample after the last gap
@@ -57,6 +58,7 @@ STATE = np.dtype(
         ("last_still_ns", "i8"),  # end of the newest window that was stance
         ("calm_since_ns", "i8"),
         ("interval_s", "f8"),  # running mean of the sampling interval
+        ("rate_hz", "f8"),  # its inverse
         ("features", "f8", FEATURES),
         # filter: nominal state, covariance of the error state, work space
         ("position", "f8", 3),

@@ -27,7 +27,7 @@ class DetectorSettings(Config, frozen=True):
     shoe_gyro_sigma_rad_s: Positive = 8.7e-5
     shoe_threshold: Positive = 8.5e7  # the fixed threshold of pyshoe
     # The default: a small network tells how fast the foot may be moving; slower than this is stance.
-    learned_sigma_m_s: Positive = 0.14
+    learned_sigma_m_s: Positive = 0.16
     # SHOE whose threshold waits after a zero-velocity update and then grows exponentially.
     adaptive_threshold: Positive = 1e7
     adaptive_hold_s: NonNegative = 0.5
@@ -63,7 +63,7 @@ class AlignmentSettings(Config, frozen=True):
 class FilterSettings(Config, frozen=True):
     """Noise of the error-state filter."""
 
-    accel_noise_m_s2_sqrt_hz: Positive = 0.015
+    accel_noise_m_s2_sqrt_hz: Positive = 0.012
     gyro_noise_rad_s_sqrt_hz: Positive = 0.0006
     # What scale errors, bandwidth and shocks add: this part of the force (without gravity) and of the rate.
     accel_scale_sqrt_s: NonNegative = 0.006
@@ -73,9 +73,8 @@ class FilterSettings(Config, frozen=True):
     )
     # The learned detector's σ counts this often in the noise of an update: updates a few ms apart err alike.
     learned_noise: NonNegative = 3.0
-    hidden_motion_s: NonNegative = (
-        0.3  # what a foot creeps by in stance: a velocity of σ, for this long alike
-    )
+    # What a foot creeps by in stance: a velocity of σ, for this long alike.
+    hidden_motion_s: NonNegative = 0.3
     step_scale: NonNegative = 0.01  # part of a step's length that no noise explains: scale errors, sole, shoe
     gate: Positive = 3.0  # innovations beyond this many sigmas inflate the measurement's noise
     lever_sigma_m: NonNegative = 0.1  # still point of the sole to sensor; 0 leaves a plain 9-state filter
