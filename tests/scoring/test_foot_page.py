@@ -1,6 +1,7 @@
 """docs/foot-ins.md: made from findings, and every variant of the ablation is one that the navigator knows."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,12 @@ def findings() -> Findings:
         ablation={"one": {"everything": [0.5, 0.25, 1.5]}},
         cost=COST,
     )
+
+
+def test_the_page_says_what_is_training_data() -> None:
+    assert "training data" not in page(findings())
+    told = page(replace(findings(), cross_fit=[0.1, 0.2, 0.6]))
+    assert "mean 0.300, median 0.200, worst 0.600 m (n 3)" in told
 
 
 def test_the_page_tells_median_mean_and_worst() -> None:

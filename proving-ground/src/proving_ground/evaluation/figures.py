@@ -12,9 +12,11 @@ from bootprint import logs
 from pdr_engine.foot import METHODS, FootSettings
 from proving_ground.evaluation.ablation import ABLATIONS, plain, rmse_of
 from proving_ground.evaluation.benchmark import measure, walk_of
+from proving_ground.evaluation.cross_fit import cross_fit
 from proving_ground.evaluation.evaluate import FUSED, Evaluated, evaluate_task, plan
 from proving_ground.evaluation.foot_page import Findings, page
 from proving_ground.evaluation.foot_plots import save_shares, save_tracks
+from proving_ground.evaluation.train_stance import training_runs
 from sensor_gateway.recordings import load_runs
 from sensor_gateway.recordings.run import Run
 
@@ -22,6 +24,7 @@ SETS = ("pyshoe-vicon", "foot-gcp", "xio-gait", "gaitmap-example", "dualfoot-fgo
 WALKED = SETS[:2]  # the sets with enough runs to compare methods and choices by
 DEFAULT = FootSettings().method
 _TURNS = 3
+_CROSS_FIT_RUNS = 4  # a half of fewer teaches nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +63,7 @@ def main(data: Path, docs: Path) -> None:
             one.name: {variant.name: rmse_of(variant, one.runs) for variant in ABLATIONS} for one in walked
         },
         cost=measure(walk_of(None), _TURNS),
+        cross_fit=cross_fit(data) if len(training_runs(data)) >= _CROSS_FIT_RUNS else None,
     )
     (docs / "foot-ins.md").write_text(page(findings), encoding="utf-8")
 

@@ -81,6 +81,12 @@ class Network:
         return Network(inputs, self.hidden_bias - inputs @ mean, self.output, self.bias)
 
 
+def training_runs(data: Path) -> list[Run]:
+    """The runs of the training set that know every foot's own way; none if the set is not there."""
+    runs = load_runs([data / SET]) if (data / SET).is_dir() else []
+    return [run for run in runs if set(run.imus) <= set(run.truth)]
+
+
 def examples_of(run: Run, place: str) -> Examples:
     """Features of every third sample of a foot, and its true speed there."""
     imu, truth = run.imus[place], run.truth[place]
@@ -168,7 +174,7 @@ def _row(values: FloatArray) -> str:
 
 def main(data: Path, half: str | None) -> None:
     """Train on the set's runs (of even or odd number, if asked) and write the module to standard output."""
-    runs = load_runs([data / SET])
+    runs = training_runs(data)
     first, step = {"even": (0, 2), "odd": (1, 2), None: (0, 1)}[half]
     parts = [examples_of(run, place) for run in runs[first::step] for place in run.imus]
     sys.stdout.write(source_of(train(Examples.joined(parts))))

@@ -1,0 +1,74 @@
+"""The learned detector on trials that it was not trained on: weights of one half of the set, scored on the other.
+
+    python -m proving_ground.evaluation.cross_fit DATA        (about two minutes)
+
+The kernel's weights are constants of compiled code, so each half is scored by a process of its own, on a copy of
+`pdr_engine` with that half's weights.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+import pdr_engine
+from proving_ground.evaluation.ablation import ABLATIONS, rmse_of
+from proving_ground.evaluation.train_stance import SET, training_runs
+
+Half = Literal["even", "odd"]
+_OTHER: dict[Half, Half] = {"even": "odd", "odd": "even"}
+_FIRST: dict[Half, int] = {"even": 0, "odd": 1}
+
+
+def cross_fit(data: Path) -> list[float]:
+    """The 2-D RMSE, m, of every trial with weights trained on the half without it."""
+    return [error for half in _OTHER for error in _trained_on(half, data)]
+
+
+def _trained_on(half: Half, data: Path) -> list[float]:
+    with tempfile.TemporaryDirectory() as folder:
+        package = Path(folder) / "pdr_engine"
+        shutil.copytree(
+            Path(pdr_engine.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__")
+        )
+        weights = _python("train_stance", str(data), "--half", half)
+        (package / "foot" / "weights.py").write_text(weights, encoding="utf-8")
+        scored = _python("cross_fit", str(data), "--score", _OTHER[half], path=folder)
+    errors: list[float] = json.loads(scored)
+    return errors
+
+
+def _python(module: str, *arguments: str, path: str | None = None) -> str:
+    """What a module of this folder prints, with ``path`` before all others."""
+    environment = os.environ | ({"PYTHONPATH": path} if path else {})
+    command = [sys.executable, "-m", f"proving_ground.evaluation.{module}", *arguments]
+    return subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def summary(errors: Sequence[float]) -> str:
+    """Mean, median, worst and n in words."""
+    return (
+        f"mean {np.mean(errors):.3f}, median {np.median(errors):.3f}, worst {np.max(errors):.3f} m "
+        f"(n {len(errors)})"
+    )
+
+
+def main(arguments: Sequence[str]) -> None:
+    """The command: cross-fit a data folder, or score one half with the weights at hand."""
+    data = Path(arguments[0])
+    if arguments[1:2] == ["--score"]:
+        first = _FIRST["even" if arguments[2] == "even" else "odd"]
+        sys.stdout.write(json.dumps(rmse_of(ABLATIONS[0], training_runs(data)[first::2])))
+        return
+    sys.stdout.write(f"{SET}, weights of the other half: {summary(cross_fit(data))}\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
