@@ -6,14 +6,12 @@ Speed itself is asserted by the command (``--check``), never here.
 import json
 import os
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import structlog
 import typer
 from typer.testing import CliRunner
 
@@ -101,13 +99,6 @@ def test_levelling_and_turning() -> None:
     )
     np.testing.assert_array_equal(skew(np.array([1.0, 2.0, 3.0])) @ [4.0, 5.0, 6.0], [-3.0, 6.0, -3.0])
     assert pytest.approx(9.8, abs=0.01) == GRAVITY_M_S2
-
-
-@pytest.fixture(autouse=True)
-def _logging_as_before() -> Iterator[None]:
-    """The command sets up logging for its process, which here is everybody's."""
-    yield
-    structlog.reset_defaults()
 
 
 def bootprint(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:

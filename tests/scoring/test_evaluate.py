@@ -2,13 +2,11 @@
 
 import json
 import sys
-from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
-import structlog
 from rich.console import Console
 
 from bootprint.cli import main
@@ -26,13 +24,6 @@ WALK = walking_foot(strides=20)
 @pytest.fixture(scope="module")
 def walk_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_run_folder(tmp_path_factory.mktemp("walks") / "square", {"right_foot": WALK})
-
-
-@pytest.fixture(autouse=True)
-def _logging_as_before() -> Iterator[None]:
-    """The command sets up logging for its process, which here is everybody's."""
-    yield
-    structlog.reset_defaults()
 
 
 def bootprint(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
