@@ -12,9 +12,9 @@ from bootprint.stopping import Stop
 from bootprint.topics import Identity
 from proving_ground.exercises.emulated_radio import NetCounts
 from proving_ground.exercises.exercise import COMMAND_POST, LEADER, REALM, UNIT, Exercise, Soldier
-from proving_ground.exercises.inprocess import play_run, positions_of
 from proving_ground.exercises.observer import Heard
 from proving_ground.exercises.stage import Play, Stage
+from proving_ground.inprocess import play_run, positions_of
 from support.golden import FUSION, ORIGIN, PDR, START, small_walk
 from support.waiting import wait_until
 

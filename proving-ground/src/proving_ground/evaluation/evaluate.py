@@ -172,7 +172,7 @@ def estimate_fused(run: Run, method: str) -> Estimate:
     from fusion.config import FusionConfig
     from pdr_engine.config import PdrConfig
     from pdr_engine.foot import warm_up
-    from proving_ground.exercises.inprocess import play_run, positions_of
+    from proving_ground.inprocess import play_run, positions_of
 
     warm_up()
     feet = [place for place in FEET if place in run.imus]
