@@ -34,7 +34,9 @@ def moved(track: Track) -> list[float]:
 
 def test_a_still_sensor_stays_where_it_is_and_its_doubt_stays_bounded() -> None:
     track = navigate(still(60.0))
-    assert np.abs(track.position_m).max() < 0.01
+    assert np.abs(track.position_m[:, :2]).max() < 0.005
+    # The learned detector's softer update lets the height creep, 9 mm in this minute; the rules' stayed under 5 mm.
+    assert np.abs(track.position_m[:, 2]).max() < 0.01
     assert {step.motion for step in track.steps} == {"standing"}
     assert len(track.steps) == pytest.approx(120, abs=2)
     deviations = np.array([np.sqrt(np.diag(step.covariance)) for step in track.steps])

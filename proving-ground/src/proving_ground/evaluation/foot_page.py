@@ -87,8 +87,9 @@ def _head() -> str:
 
 Made by `make figures` from the recorded data; `bootprint evaluate` gives the same rows. Errors are horizontal,
 in metres, after a rigid fit of yaw and offset; one configuration for all. The sets are public recordings under
-the MIT licence: pyshoe-vicon by Wagstaff, Peretroukhin and Kelly (University of Toronto; walking, running, stairs,
-crawling, ladder), foot-gcp by M. T. Koroglu (walks over surveyed points), xio-gait by x-io Technologies,
+the MIT licence: pyshoe-vicon by Wagstaff, Peretroukhin and Kelly (University of Toronto; walking, running,
+shuffling, backward, crawling, a ladder-like climb), foot-gcp from mtahakoroglu's repository
+gait-driven-inertial-navigation-dataset (walks over surveyed points), xio-gait by x-io Technologies,
 gaitmap-example by MaD Lab (FAU), dualfoot-fgo by Hu and Hu (60 Hz)."""
 
 
@@ -213,7 +214,8 @@ def _sensors() -> str:
         "## Sensors",
         "",
         f'`[pdr.foot] sensor = "…"` (default `{REFERENCE}`, with which everything above was tuned) exchanges the',
-        "sensor's own part of the noise, by its data sheet (`pdr_engine.foot.presets`); what motion adds stays,",
+        "sensor's own part of the noise (`pdr_engine.foot.presets` says which figures were never checked against a",
+        "data sheet: those of the GX5, the NGIMU and the GX3's bias); what motion adds stays,",
         "and so does every term set by hand. `unknown` is the worst of all.",
         "",
         *_header(
