@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from bootprint import wire
+from bootprint import wire, zenoh_bus
 from bootprint.bus import Envelope
 from bootprint.errors import BusError
 from bootprint.messages import FootStep, Health, Pressure
@@ -114,6 +114,47 @@ def test_garbage_on_a_key_is_counted_and_survived() -> None:
         assert (key, b"\xc1 not msgpack") in raw
         sender.close()
         receiver.close()
+
+
+def test_an_inlet_keeps_messages_until_they_are_taken() -> None:
+    with running_router() as router:
+        sender, receiver = open_bus(router), open_bus(router)
+        inlet = receiver.open_inlet(A1.selector("foot_step"))
+        garbage_key = "bp/@v1/alpha/a1/nonsense/x"
+        garbage = receiver.open_inlet(garbage_key)
+        for n in range(1, 21):
+            sender.publish(step(n))
+        taken: list[Envelope] = []
+        wait_until(lambda: (taken.extend(inlet.take()), len(taken) >= 20)[1], what="twenty steps")
+        assert taken == [step(n) for n in range(1, 21)]
+        assert list(inlet.take()) == []
+        wait_until(
+            lambda: (sender._session.put(garbage_key, b"\xff"), list(garbage.take()), receiver.rejected)[2],
+            what="the garbage counted",
+        )
+        assert receiver.overruns == 0
+        sender.close()
+        receiver.close()
+
+
+def test_a_full_inlet_is_counted_and_goes_on_with_the_newest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(zenoh_bus, "_CHANNEL_SIZE", 8)
+    with running_router() as router:
+        sender, receiver, witness = open_bus(router), open_bus(router), open_bus(router)
+        inlet = receiver.open_inlet(A1.selector("pressure"))
+        heard: list[Envelope] = []
+        witness.subscribe(A1.selector("pressure"), heard.append)
+        wait_until(lambda: (sender.publish(pressure(0)), heard)[1], what="the subscriptions stand")
+        list(inlet.take())
+        for n in range(1, 41):
+            sender.publish(pressure(n))
+        wait_until(lambda: heard[-1] == pressure(40), what="the last message")
+        taken: list[Envelope] = []
+        wait_until(lambda: (taken.extend(inlet.take()), pressure(40) in taken)[1], what="the newest")
+        assert receiver.overruns >= 1
+        assert len(taken) < 40
+        for bus in (sender, receiver, witness):
+            bus.close()
 
 
 def test_liveliness_tells_who_runs() -> None:

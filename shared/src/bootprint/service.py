@@ -1,7 +1,8 @@
 """The scaffold of every service: arguments, logging, signals, router, liveliness, health, and a clean end.
 
-A service is a `Part` (its core plus whatever it opens) in a loop of one thread: messages and posted jobs come
-through one inbox, `tick` comes with host time, outputs go to the bus. So a core is never called from two threads.
+A service is a `Part` (its core plus whatever it opens) in a loop of one thread: messages are fetched from the bus
+many times a second, posted jobs come through an inbox at once, `tick` comes with host time, outputs go to the bus.
+So a core is never called from two threads, and a quiet process sleeps.
 """
 
 import queue
@@ -10,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Protocol
 
@@ -25,9 +27,11 @@ from bootprint.figures import Figures
 from bootprint.messages import Health
 from bootprint.stopping import Stop
 from bootprint.topics import Identity
-from bootprint.zenoh_bus import ZenohBus, open_bus
+from bootprint.zenoh_bus import Inlet, ZenohBus, open_bus
 
 _INBOX_SIZE = 20_000
+_FETCH_S = 0.05  # event time between two looks at the bus: fewer wake-ups are what many processes live on
+_LEAST_FETCH_S = 0.002
 _TICK_S = 0.05
 _HEALTH_S = 1.0
 EXIT_BAD_INPUT = 2
@@ -116,7 +120,7 @@ class Context:
             service=service, soldier=self.identity.soldier
         )
         self.lossless = options.speed == "max"
-        self.inbox: queue.Queue[Envelope | Job | None] = queue.Queue(_INBOX_SIZE)
+        self.inbox: queue.Queue[Job] = queue.Queue(_INBOX_SIZE)
         self.inbox_dropped = 0
         self.stopping = Stop()
         self.exit_code = 0
@@ -145,18 +149,11 @@ class Context:
 
     def post(self, job: Job) -> None:
         """Run ``job`` in the main loop and publish what it returns; from any thread."""
-        self._put(job)
-
-    def receive(self, envelope: Envelope) -> None:
-        """Hand a message from the bus to the main loop; from any thread."""
-        self._put(envelope)
-
-    def _put(self, item: Envelope | Job) -> None:
         if self.lossless:
-            self.inbox.put(item)
+            self.inbox.put(job)
             return
         try:
-            self.inbox.put_nowait(item)
+            self.inbox.put_nowait(job)
         except queue.Full:
             self.inbox_dropped += 1
 
@@ -241,12 +238,11 @@ def _run(service: Service, context: Context) -> int:
     part = service.build(context)
     bus = context.connect()
     try:
-        for subject in service.subjects:
-            bus.subscribe(context.identity.selector(subject), context.receive)
+        inlets = [bus.open_inlet(context.identity.selector(subject)) for subject in service.subjects]
         part.start()
         bus.declare_alive(context.identity, service.name)
         context.log.info("running", router=context.options.router or context.computer.router)
-        _Loop(service, part, context).run()
+        _Loop(service, part, context, inlets).run()
         context.log.info("stopped", exit_code=context.exit_code)
     finally:
         context.stopping.finish()
@@ -260,13 +256,22 @@ def _resident_mb() -> float:
     return pages * resource.getpagesize() / 1e6
 
 
-class _Loop:
-    """The main loop: inbox, tick, health."""
+def _fetch_interval_s(context: Context) -> float:
+    """Host seconds between two looks at the bus: what a message may wait is a matter of event time."""
+    if context.lossless:
+        return _LEAST_FETCH_S
+    return max(_LEAST_FETCH_S, _FETCH_S / float(context.options.speed))
 
-    def __init__(self, service: Service, part: Part, context: Context) -> None:
+
+class _Loop:
+    """The main loop: jobs, messages, tick, health."""
+
+    def __init__(self, service: Service, part: Part, context: Context, inlets: Sequence[Inlet]) -> None:
         self._service = service
         self._part = part
         self._context = context
+        self._inlets = inlets
+        self._fetch_s = _fetch_interval_s(context)
         self._errors = 0
         self._health_sequence = 0
         self._connected = True
@@ -274,40 +279,44 @@ class _Loop:
 
     def run(self) -> None:
         context, part = self._context, self._part
-        next_tick = next_health = time.monotonic()
+        next_fetch = next_tick = next_health = time.monotonic()
         while not context.stopping.is_set():
-            self._drain(max(0.0, next_tick - time.monotonic()))
+            self._work(next_fetch)
+            found = self._fetch()
             now = time.monotonic()
+            next_fetch = now if found and context.lossless else now + self._fetch_s
             if now >= next_tick:
                 next_tick = now + _TICK_S
                 self._guarded(lambda: part.tick(context.clock.now_ns()))
             if now >= next_health:
                 next_health = now + _HEALTH_S
                 self._guarded(self._health)
-        self._drain(0.0, to_the_end=True)
+        self._work(time.monotonic())
+        self._fetch()
         self._guarded(part.close)
         self._guarded(lambda: self._health(stopped=True))
 
-    def _drain(self, timeout_s: float, *, to_the_end: bool = False) -> None:
-        """Take what is waiting, at least until ``timeout_s`` has passed or something came."""
-        context = self._context
-        deadline = time.monotonic() + (1.0 if to_the_end else _TICK_S)
+    def _work(self, until: float) -> None:
+        """Do posted jobs as they come, until a host time; one that waits already is done in any case."""
+        inbox = self._context.inbox
         try:
-            item = context.inbox.get(timeout=timeout_s) if timeout_s > 0 else context.inbox.get_nowait()
             while True:
-                self._take(item)
-                if time.monotonic() > deadline:
+                wait_s = until - time.monotonic()
+                self._guarded(inbox.get(timeout=wait_s) if wait_s > 0.0 else inbox.get_nowait())
+                if time.monotonic() > until + _TICK_S:
                     return
-                item = context.inbox.get_nowait()
         except queue.Empty:
             return
 
-    def _take(self, item: Envelope | Job | None) -> None:
-        if isinstance(item, Envelope):
-            self._context.clock.observe(item.message.time_ns)
-            self._guarded(lambda: self._part.handle(item))
-        elif item is not None:
-            self._guarded(item)
+    def _fetch(self) -> bool:
+        """Hand over what waits on the bus; whether there was anything."""
+        found = False
+        for inlet in self._inlets:
+            for envelope in inlet.take():
+                found = True
+                self._context.clock.observe(envelope.message.time_ns)
+                self._guarded(partial(self._part.handle, envelope))
+        return found
 
     def _guarded(self, job: Job) -> None:
         """Publish what the job yields; an error is logged and counted, for nothing sent may stop a process."""
@@ -343,6 +352,7 @@ class _Loop:
                     **figures.counters,
                     "handler_errors": self._errors,
                     "bus_rejected": context.bus.rejected,
+                    "bus_overruns": context.bus.overruns,
                     "inbox_dropped": context.inbox_dropped,
                     "router_losses": self._router_losses,
                 },

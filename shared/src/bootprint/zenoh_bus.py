@@ -2,14 +2,15 @@
 
 Every process is a *client* of one router per computer; scouting, gossip and shared memory are off. What was
 learned the hard way is kept here: sessions open in a loop that can be interrupted; samples leave zenoh through a
-channel and one thread per subscription (a slow plain callback would stall the whole session and keep the process
-from exiting); on closing, the session goes first and the threads are joined after it.
+channel (a slow plain callback would stall the whole session and keep the process from exiting), which a service
+empties when it likes (`Inlet`: waking threads for every message costs more than the messages do) and a tool by a
+thread per subscription; on closing, the session goes first and the threads are joined after it.
 """
 
 import json
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import zenoh
 from zenoh import ext
@@ -66,6 +67,42 @@ def _router_config(endpoint: str) -> zenoh.Config:
     )
 
 
+class Inlet:
+    """A subscription whose messages wait until they are taken."""
+
+    def __init__(self, subscriber: _Subscriber, bounded: bool) -> None:
+        self._samples = subscriber.handler
+        self._subscriber = subscriber
+        self._bounded = bounded
+        self.rejected = 0
+        """Messages that were no valid message of their topic (counted, dropped)."""
+        self.overruns = 0
+        """Times that the channel was found full: older messages may have been dropped."""
+
+    def take(self) -> Iterator[Envelope]:
+        """What waits now, in the order of its arrival; at most a channel full."""
+        for count in range(1, _CHANNEL_SIZE + 1):
+            sample = self._samples.try_recv()
+            if sample is None:
+                return
+            self.overruns += self._bounded and count == _CHANNEL_SIZE
+            envelope = self._decoded(str(sample.key_expr), sample.payload.to_bytes())
+            if envelope is not None:
+                yield envelope
+
+    def _decoded(self, key: str, payload: bytes) -> Envelope | None:
+        try:
+            return _decode(key, payload)
+        except WireError:
+            self.rejected += 1
+            return None
+
+
+def _decode(key: str, payload: bytes) -> Envelope:
+    address = parse_key(key)
+    return Envelope(address, wire.decode(address.subject, payload))
+
+
 class EmbeddedRouter:
     """A zenoh router inside this process (~22 MB); it routes in its own threads until closed."""
 
@@ -119,12 +156,12 @@ class ZenohBus:
         self._lossless = lossless
         self._publishers: dict[Address, _Publisher] = {}
         self._subscribers: list[object] = []
+        self._inlets: list[Inlet] = []
         self._tokens: list[zenoh.LivelinessToken] = []
         self._threads: list[threading.Thread] = []
         self._lock = threading.Lock()
         self._closed = False
-        self.rejected = 0
-        """Messages that were no valid message of their topic (counted, dropped)."""
+        self._rejected = 0
 
     def publish(self, envelope: Envelope) -> None:
         """Send one message by its topic's quality of service; from any thread."""
@@ -158,6 +195,22 @@ class ZenohBus:
             publisher_detection=True,
         )
 
+    @property
+    def rejected(self) -> int:
+        """Messages that were no valid message of their topic (counted, dropped)."""
+        return self._rejected + sum(inlet.rejected for inlet in self._inlets)
+
+    @property
+    def overruns(self) -> int:
+        """Times that an inlet was found full: older messages may have been dropped."""
+        return sum(inlet.overruns for inlet in self._inlets)
+
+    def open_inlet(self, selector: str) -> Inlet:
+        """Let every message that matches wait until it is taken; same care as `subscribe`."""
+        inlet = Inlet(self._declared(self._new_subscriber, selector), bounded=not self._lossless)
+        self._inlets.append(inlet)
+        return inlet
+
     def subscribe(self, selector: str, handler: Handler) -> None:
         """Call ``handler`` from a thread with every valid message that matches; recover missed events.
 
@@ -166,12 +219,11 @@ class ZenohBus:
 
         def decoded(key: str, payload: bytes) -> None:
             try:
-                address = parse_key(key)
-                message = wire.decode(address.subject, payload)
+                envelope = _decode(key, payload)
             except WireError:
-                self.rejected += 1
+                self._rejected += 1
                 return
-            handler(Envelope(address, message))
+            handler(envelope)
 
         self._spawn(self._new_subscriber, selector, decoded)
 
@@ -202,10 +254,7 @@ class ZenohBus:
         return zenoh.handlers.RingChannel(_CHANNEL_SIZE)
 
     def _spawn(self, declare: Callable[[str], _Subscriber], selector: str, handler: RawHandler) -> None:
-        try:
-            subscriber = declare(selector)
-        except zenoh.ZError as error:
-            raise BusError(f"{selector!r} is no selector of keys: {_first_line(error)}") from error
+        subscriber = self._declared(declare, selector)
 
         def drain() -> None:
             for sample in subscriber.handler:
@@ -215,6 +264,13 @@ class ZenohBus:
         self._subscribers.append(subscriber)
         self._threads.append(thread)
         thread.start()
+
+    @staticmethod
+    def _declared(declare: Callable[[str], _Subscriber], selector: str) -> _Subscriber:
+        try:
+            return declare(selector)
+        except zenoh.ZError as error:
+            raise BusError(f"{selector!r} is no selector of keys: {_first_line(error)}") from error
 
     def declare_alive(self, identity: Identity, service: str) -> None:
         """Hold a liveliness token for a service until the bus closes or the process dies."""
