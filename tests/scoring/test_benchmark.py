@@ -122,7 +122,7 @@ def test_the_command_measures_a_walk_and_a_fresh_engine(
     assert figures["samples"] == len(walking_foot(strides=2).time_s)
     assert all(value > 0 for value in figures.values())
     assert figures["times_textbook"] == pytest.approx(figures["us_textbook"] / figures["us_one_pass"])
-    assert 20.0 < figures["resident_mb"] < 1000.0
+    assert 20.0 < figures["resident_mb"] < 120.0
 
 
 def run_with(monkeypatch: pytest.MonkeyPatch, figures: FootFigures, *arguments: str) -> tuple[int, str]:

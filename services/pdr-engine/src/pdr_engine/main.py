@@ -10,7 +10,8 @@ def build(context: Context) -> Part:
     """The core of this computer's soldier, set up from ``[pdr]``, its kernel compiled before the first sample."""
     computer = context.computer
     config = computer.section("pdr", PdrConfig)
-    warm_up()
+    if reason := warm_up():
+        context.log.warning("numba runs the foot filter in this process, in more memory", reason=reason)
     return CorePart(EngineCore(config, computer.identity))
 
 

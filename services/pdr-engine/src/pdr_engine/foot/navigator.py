@@ -13,13 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from bootprint.messages import Float64Array, Int64Array
-from pdr_engine.foot.memory import ESTIMATE, RING, SAMPLE, STEP, fresh_state, parameters
+from pdr_engine.foot.machine_code import load_kernel
+from pdr_engine.foot.memory import SAMPLE
 from pdr_engine.foot.settings import FootSettings
 from pdr_engine.foot.steps import FootStepEstimate, step_from_row
-from pdr_engine.foot.stream import feed
+from pdr_engine.foot.tables import CHUNK, fresh_tables
 
-CHUNK = 1024  # samples a call of the kernel
-_ROWS = RING + CHUNK
 COUNTERS = ("accepted", "dropped", "gaps", "clippings", "stances", "realignments")
 
 
@@ -65,12 +64,10 @@ class FootNavigator:
 
     def __init__(self, settings: FootSettings | None = None) -> None:
         self.settings = settings or FootSettings()
-        self._parameters = parameters(self.settings)
-        self._state = fresh_state(self.settings)
-        self._batch = np.zeros(CHUNK, SAMPLE)
-        self._time_ns, self._accel, self._gyro = (self._batch[name] for name in SAMPLE.names or ())
-        self._estimates = np.zeros(_ROWS, ESTIMATE)
-        self._steps = np.zeros(_ROWS, STEP)
+        tables = fresh_tables(self.settings)
+        self._state, self._estimates, self._steps = tables.state, tables.estimates, tables.steps
+        self._time_ns, self._accel, self._gyro = (tables.batch[name] for name in SAMPLE.names or ())
+        self._run = load_kernel().bind(tables)
         self._made = self._state["estimates"], self._state["steps"]
 
     def process(
@@ -112,7 +109,7 @@ class FootNavigator:
         return bias
 
     def _feed(self, count: int, *, ends: bool) -> FootEstimates:
-        feed(self._state, self._parameters, self._batch, count, ends, self._estimates, self._steps)
+        self._run(count, ends)
         estimates, steps = self._made
         ended = steps.item()
         return FootEstimates(
@@ -122,8 +119,12 @@ class FootNavigator:
 
 
 @cache
-def warm_up() -> None:
-    """Compile the kernel, or load it from disk, before the first sample comes."""
+def warm_up() -> str | None:
+    """Compile the kernel, or load it from disk, before the first sample comes.
+
+    Returns why numba has to run it in this process, None if it does not (`machine_code`).
+    """
     navigator = FootNavigator()
     navigator.process(np.zeros(1, np.int64), np.zeros((1, 3)), np.zeros((1, 3)))
     navigator.finish()
+    return load_kernel().fallback
