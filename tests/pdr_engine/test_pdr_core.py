@@ -1,8 +1,10 @@
 """The engine's core on the bus's messages: same input, same bytes; steps and poses that belong together."""
 
+import dataclasses
 import math
 import re
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -156,3 +158,31 @@ def test_figures_tell_rates_counts_and_silence() -> None:
 def test_a_wrong_section_is_refused_by_name(values: dict, complaint: str) -> None:
     with pytest.raises(ConfigError, match=re.escape(complaint)):
         convert(values, PdrConfig, where="[pdr]")
+
+
+def test_a_step_message_tells_all_that_the_navigator_tells() -> None:
+    """Only arrays change their shape on the way; whoever adds a figure to a step adds it to the message."""
+    messages = of_kind(run(batches(WALK, "left_foot")), FootStep)
+    for message, step in zip(messages, navigate(WALK).steps, strict=True):
+        for field in dataclasses.fields(step):
+            if field.name == "covariance":
+                np.testing.assert_allclose(
+                    symmetric(message.covariance), step.covariance, rtol=1e-9, atol=1e-20
+                )
+            else:
+                told = getattr(step, field.name)
+                assert getattr(message, field.name) == (
+                    tuple(told) if field.name == "displacement_m" else told
+                )
+        assert message.length_m == math.dist((0.0, 0.0, 0.0), step.displacement_m)
+        assert message.horizontal_length_m == math.hypot(*step.displacement_m[:2])
+
+
+def test_a_step_of_an_older_engine_leaves_what_it_does_not_know_unknown() -> None:
+    (message, *_) = of_kind(run(batches(WALK, "left_foot")), FootStep)
+    plain = msgspec.msgpack.decode(wire.encode(message))
+    new = ("direction", "length_m", "clearance_m", "swing_s", "stance_s", "quality_pct", "common_scale_sigma")
+    older = {name: value for name, value in plain.items() if name not in new}
+    decoded = msgspec.convert(older, FootStep)
+    assert [getattr(decoded, name) for name in new] == [None] * len(new)
+    assert decoded.covariance == message.covariance

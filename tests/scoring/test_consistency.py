@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proving_ground.evaluation.alignment import Track, fit_rigid
-from proving_ground.evaluation.consistency import StepChain, consistency
+from proving_ground.evaluation.consistency import Consistency, StepChain, consistency
 from proving_ground.evaluation.scoring import score_track
 from sensor_gateway.recordings.run import Truth
 
@@ -128,3 +128,62 @@ def test_the_score_carries_the_figures() -> None:
     assert (score.nees, score.inside_95_pct) == (expected.nees, expected.inside_95_pct)
     yaw = fit_rigid(chain.position_m, truth_m).yaw_rad
     assert yaw == pytest.approx(1.0, abs=0.2)
+
+
+def alike(rng: np.random.Generator) -> tuple[StepChain, Truth]:
+    """A walk whose steps err by a scale, a slope and a turn that all of them share, and a little by themselves."""
+    scale, slope, turn_rad_s = rng.normal(size=3) * [0.03, 0.02, 0.002]
+    own = np.array([0.01, 0.01, 0.002])
+    error = rng.normal(size=(STRIDES, 3)) * own
+    truth = StepChain(
+        time_s=STRIDE_S * np.arange(STRIDES + 1.0),
+        displacement_m=np.tile([1.4, 0.0], (STRIDES, 1)),
+        heading_change_rad=rng.normal(scale=0.2, size=STRIDES),
+        covariance=np.tile(
+            np.diag(own**2 + [(0.03 * 1.4) ** 2, 0.0, (0.002 * STRIDE_S) ** 2]), (STRIDES, 1, 1)
+        ),
+    )
+    claimed = replace(
+        truth,
+        displacement_m=truth.displacement_m * (1.0 + scale) + error[:, :2],
+        heading_change_rad=truth.heading_change_rad + turn_rad_s * STRIDE_S + error[:, 2],
+        common_scale=0.03,
+        common_turn_rad_s=0.002,
+        common_slope=0.02,
+        climb_m=0.2 * (1.0 + scale) + slope * 1.4 + rng.normal(size=STRIDES) * 0.005,
+        climb_variance_m2=np.full(STRIDES, (0.03 * 0.2) ** 2 + (0.02 * 1.4) ** 2 + 0.005**2),
+    )
+    height = 0.2 * np.arange(STRIDES + 1.0)
+    # Densely known, as by motion capture: straight from stance to stance.
+    fine_s = np.arange(0.0, STRIDES * STRIDE_S + 1e-9, 0.05)
+    columns = (*truth.position_m.T, height)
+    return claimed, Truth(fine_s, np.column_stack([np.interp(fine_s, truth.time_s, c) for c in columns]))
+
+
+def mean_of(found: list[Consistency | None], figure: str) -> float:
+    return float(np.mean([getattr(one, figure) for one in found]))
+
+
+def test_errors_that_steps_share_are_honest_as_shared_and_not_as_noise() -> None:
+    rng = np.random.default_rng(11)
+    shared, noise = [], []
+    for _ in range(90):
+        chain, truth = alike(rng)
+        shared.append(consistency(chain, truth, STRIDES * STRIDE_S))
+        as_noise = replace(chain, common_scale=0.0, common_turn_rad_s=0.0, common_slope=0.0)
+        noise.append(consistency(as_noise, truth, STRIDES * STRIDE_S))
+    for figure, honest in (("nees", 2.0), ("along_nees", 1.0), ("across_nees", 1.0), ("height_nees", 1.0)):
+        assert mean_of(shared, figure) == pytest.approx(honest, rel=0.2), figure
+    # A turn that all share bends the run, and most of that the run's fit takes away: across, little is seen of it.
+    for figure, honest in (("nees", 2.0), ("along_nees", 1.0), ("height_nees", 1.0)):
+        assert mean_of(noise, figure) > 1.5 * honest, figure
+    assert mean_of(shared, "height_inside_95_pct") == pytest.approx(95.0, abs=5.0)
+    assert mean_of(shared, "inside_95_pct") == pytest.approx(95.0, abs=5.0)
+
+
+def test_heights_are_unknown_where_the_truth_is_flat() -> None:
+    chain, truth_m = walk(np.random.default_rng(0))
+    found = consistency(chain, truth_of(chain, truth_m), STRIDES * STRIDE_S)
+    assert found is not None
+    assert found.height_nees is None
+    assert found.height_inside_95_pct is None

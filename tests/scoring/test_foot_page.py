@@ -1,6 +1,7 @@
 """docs/foot-ins.md: made from findings, and every variant of the ablation is one that the navigator knows."""
 
 import re
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,13 +13,31 @@ from pdr_engine.foot import METHODS, FootSettings
 from proving_ground.evaluation import figures
 from proving_ground.evaluation.ablation import ABLATIONS, Variant, plain, rmse_of
 from proving_ground.evaluation.benchmark import LIMITS, FootFigures
+from proving_ground.evaluation.consistency import Consistency
+from proving_ground.evaluation.foot_motion_page import MotionFindings
 from proving_ground.evaluation.foot_page import Findings, page
+from proving_ground.evaluation.honesty import ClassHonesty
 from sensor_gateway.recordings import load_runs
 from support.recorded import recorded_data
 from support.walking_foot import walking_foot, write_run_folder
 
 ROOT = Path(__file__).parents[2]
 COST = FootFigures(1000, 12, 1.0, 0.5, 50.0, 100.0, 0.5, 100.0)
+_GOOD = Consistency(1.0, 100.0, 10, 1.0, 0.25, None, None)
+_POOR = Consistency(5.0, 80.0, 10, 2.0, 0.75, 2.0, 80.0)
+MOTION = MotionFindings(
+    labels=(
+        Counter({("crawling", "crawling"): 7, ("crawling", "walking"): 1}),
+        Counter({("crawling", "crawling"): 5}),
+    ),
+    stairs={"up": Counter(stairs=14, walking=5)},
+    directions={"one": Counter(forward=20, left=3)},
+    honesty={
+        "walking": ClassHonesty([_GOOD], None, None),
+        "crawling": ClassHonesty([_POOR, _POOR], (4.0, 0.5), 77.5),
+    },
+    sets={"one": [_GOOD, _POOR]},
+)
 LARGEST_PICTURE = 150_000
 
 
@@ -80,7 +99,19 @@ def findings() -> Findings:
         plain={"one": errors, "two": errors},
         ablation={"one": {"everything": [0.5, 0.25, 1.5]}},
         cost=COST,
+        motion=MOTION,
     )
+
+
+def test_the_page_tells_classes_by_halves_and_the_covariance_by_set_and_class() -> None:
+    text = page(findings())
+    assert "| crawling | 1 / 0 | 0 / 0 | 0 / 0 | 7 / 5 | 0 / 0 | 0 / 0 |" in text
+    assert "- Stairs without truth, up: stairs 14, walking 5." in text
+    assert "- Directions on one: forward 20, left 3." in text
+    assert "| one | 2 | 90.0 | 50 | 3.00 / 3.00 | 1.50 / 1.50 | 0.50 / 0.50 | 2.00 / 2.00 | 80.0 |" in text
+    assert "| mostly walking | 1 | 100.0 | 100 | 1.00 / 1.00 | 1.00 / 1.00 | 0.25 / 0.25 | – | – |" in text
+    assert "| crawling | 4.00 | 0.50 | 77.5 |" in text
+    assert "| walking | – |" not in text  # one run has no halves
 
 
 def test_the_page_says_what_is_training_data() -> None:

@@ -37,10 +37,11 @@ def walking_foot(strides: int = 20, seed: int = 0, offset_m: float = 0.0) -> Wal
         position[:, 1] += STRIDE_M * np.sin(heading) * smooth
         position[:, 2] += LIFT_M * 64.0 * (u * (1 - u)) ** 3
         pitch += PITCH_RAD * np.sin(2 * np.pi * u) * 16.0 * (u * (1 - u)) ** 2
-    return WalkingFoot(time_s, position, _samples(position, yaw, pitch, seed))
+    return WalkingFoot(time_s, position, samples(position, yaw, pitch, seed))
 
 
-def _samples(position: np.ndarray, yaw: np.ndarray, pitch: np.ndarray, seed: int) -> np.ndarray:
+def samples(position: np.ndarray, yaw: np.ndarray, pitch: np.ndarray, seed: int) -> np.ndarray:
+    """Force and rate (n, 6) of a sensor that goes this way, yaw before pitch (nose down), with a little noise."""
     rng = np.random.default_rng(seed)
     attitude = Rotation.from_euler("ZY", np.column_stack([yaw, pitch]))
     rate = (attitude[:-1].inv() * attitude[1:]).as_rotvec() * RATE_HZ

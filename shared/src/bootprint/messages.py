@@ -30,6 +30,7 @@ Name = Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
 
 FixKind = Literal["none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "dead_reckoning"]
 MotionClass = Literal["standing", "walking", "running", "stairs", "crawling", "unknown"]
+Direction = Literal["forward", "left", "backward", "right"]
 Mode = Literal["unplaced", "gnss", "boots", "body", "camera", "coasting", "lost"]
 TrackState = Literal["fresh", "stale", "lost"]
 ServiceState = Literal["starting", "ok", "degraded", "failed", "stopped"]
@@ -169,7 +170,19 @@ class FootStep(Message, frozen=True):
     ``displacement_m`` is forward, left, up in the foot's heading at the *start* of the step, and
     ``heading_change_rad`` is counter-clockwise positive (a yaw). ``covariance`` is the upper triangle (10 numbers,
     row by row) of the 4x4 matrix of (forward m, left m, up m, heading rad). A stance that goes on is reported
-    every half second as a step of (nearly) zero displacement with motion class "standing".
+    every half second as a step of (nearly) zero displacement with motion class "standing". Stairs and ladders are
+    up or down by the sign of the displacement.
+
+    ``direction`` is that of the displacement against where the toes point, None while that is not known.
+    ``clearance_m`` is the largest height of the sensor above the line between the two stances, ``swing_s`` the time
+    in which the foot moved, ``stance_s`` how long it had stood by ``time_ns``. ``landing_nis`` is the largest
+    normalised innovation squared (3 components) of the stance's zero-velocity updates; ``quality_pct`` counts it
+    together with ``stance_quality``, the detector's own.
+
+    The covariance holds noise and what a foot's steps have in common: a scale error of ``common_scale_sigma`` of
+    the displacement, a rise of ``common_slope_sigma`` of its horizontal length and a turn of
+    ``common_turn_sigma_rad_s`` of the duration (1 σ). Over many steps the common part grows with their sum, not
+    with its root.
     """
 
     start_time_ns: TimeNs
@@ -179,6 +192,17 @@ class FootStep(Message, frozen=True):
     motion: MotionClass = "unknown"
     stance_quality: Percent | None = None
     realigned: bool = False
+    direction: Direction | None = None
+    length_m: NonNegative | None = None
+    horizontal_length_m: NonNegative | None = None
+    clearance_m: NonNegative | None = None
+    swing_s: NonNegative | None = None
+    stance_s: NonNegative | None = None
+    landing_nis: NonNegative | None = None
+    quality_pct: Percent | None = None
+    common_scale_sigma: NonNegative | None = None
+    common_slope_sigma: NonNegative | None = None
+    common_turn_sigma_rad_s: NonNegative | None = None
 
 
 class FootPose(Message, frozen=True):

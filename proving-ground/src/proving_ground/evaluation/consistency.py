@@ -23,22 +23,35 @@ with, writing ℓ = z×(p_b − p_a) for the lever,
 So the window's own steps count, and so does the heading error it starts with, but relative to the heading that the
 fit has taken away: in the middle of a run little is left of it, at its ends most. NEES = rᵀ Cov(r)⁻¹ r has mean 2
 and is below 5.991 in 95 % of all windows when the covariance is honest.
+
+Errors that all steps share are no such ε_j. A scale error s of σ_j in step j (with d_j its displacement) and a turn
+at the rate b of σ_j (with T_j its duration) answer with
+
+    g_s = Σ_j B_j (σ_j d_j, 0),        g_b = Σ_j B_j (0, σ_j T_j);
+
+their part σ_j² d_j d_jᵀ and (σ_j T_j)² is taken out of every Q_j, and g_s g_sᵀ + g_b g_bᵀ is added to Cov(r).
+
+Along the window's displacement r shows errors of length, across it errors of heading. Heights need no fit: the
+error of a window's climb is the sum of its steps', with what they share (scale error and slope) added by size.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from proving_ground.evaluation.alignment import FloatArray, fit_rigid, interpolated, is_dense
 from sensor_gateway.recordings.run import Truth
 
 WINDOW_S = 10.0
+CHI2_95_ONE = 3.841458820694124
 CHI2_95_TWO = 5.991464547107979
 # A way-point belongs to the stance that ended this near to it.
 _SAME_STANCE_S = 0.35
 # A claim of no error at all stays solvable: a micrometre.
 _FLOOR_M2 = 1e-12
+_FLAT_M = 1e-6  # a truth that moves no higher knows no heights
 _WINDOW_AT_MOST_S = 1.5 * WINDOW_S
 
 
@@ -48,13 +61,33 @@ class StepChain:
 
     ``time_s`` (n + 1,): the first step's start, then every step's end. ``displacement_m`` (n, 2) forward and left
     in the heading at the step's start, ``heading_change_rad`` (n,), ``covariance`` (n, 3, 3) of (forward, left,
-    heading).
+    heading), in all. Of it the steps share a scale error, ``common_scale`` of the displacement, and a turn,
+    ``common_turn_rad_s`` of the duration, 1 σ each. ``climb_m`` and ``climb_variance_m2``: upwards, where the steps
+    share ``common_slope`` of the horizontal length. Each of these is (n,), or one number for all.
     """
 
     time_s: FloatArray
     displacement_m: FloatArray
     heading_change_rad: FloatArray
     covariance: FloatArray
+    common_scale: FloatArray | float = 0.0
+    common_turn_rad_s: FloatArray | float = 0.0
+    climb_m: FloatArray | float = 0.0
+    climb_variance_m2: FloatArray | float = 0.0
+    common_slope: FloatArray | float = 0.0
+
+    @cached_property
+    def common(self) -> FloatArray:
+        """What each step contributes to the two errors that all share, (n, 2, 3): scale, and turn."""
+        shares = np.zeros((len(self.heading_change_rad), 2, 3))
+        shares[:, 0, :2] = (self.displacement_m.T * self.common_scale).T
+        shares[:, 1, 2] = self.common_turn_rad_s * np.diff(self.time_s)
+        return shares
+
+    @cached_property
+    def own(self) -> FloatArray:
+        """The part of the covariance that is each step's own, (n, 3, 3)."""
+        return np.asarray(self.covariance - np.einsum("nki,nkj->nij", self.common, self.common))
 
     @cached_property
     def heading_rad(self) -> FloatArray:
@@ -70,11 +103,28 @@ class StepChain:
 
 @dataclass(frozen=True, slots=True)
 class Consistency:
-    """``nees`` is the mean over windows (2 when honest), ``inside_95_pct`` the share inside the 95 % ellipse."""
+    """``nees`` is the mean over windows (2 when honest), ``inside_95_pct`` the share inside the 95 % ellipse.
+
+    ``along_nees``, ``across_nees`` and ``height_nees`` are of one component: 1 when honest. Heights are None if the
+    truth has none.
+    """
 
     nees: float
     inside_95_pct: float
     windows: int
+    along_nees: float
+    across_nees: float
+    height_nees: float | None
+    height_inside_95_pct: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Error:
+    """One window's squared error over its variance: of the plane, and of its components."""
+
+    nees: float
+    along_nees: float
+    across_nees: float
 
 
 def rotations(angle_rad: FloatArray) -> FloatArray:
@@ -100,14 +150,27 @@ def consistency(chain: StepChain, truth: Truth, fitted_until_s: float) -> Consis
     to_estimate = fit_rigid(chain.position_m[stances], truth_m, weights).rotation.T
     fit_response = _fit_response(chain, stances, weights)
     windows = _windows(chain.time_s[stances])
-    nees = [
-        _nees(chain, (stances[a], stances[b]), to_estimate @ (truth_m[b] - truth_m[a]), fit_response)
+    if not windows:
+        return None
+    errors = [
+        _error(chain, (stances[a], stances[b]), to_estimate @ (truth_m[b] - truth_m[a]), fit_response)
         for a, b in windows
     ]
-    if not nees:
-        return None
-    inside = float(np.mean(np.array(nees) <= CHI2_95_TWO))
-    return Consistency(nees=float(np.mean(nees)), inside_95_pct=100.0 * inside, windows=len(nees))
+    nees = np.array([error.nees for error in errors])
+    heights = _height_nees(chain, truth, [(stances[a], stances[b]) for a, b in windows])
+    return Consistency(
+        nees=float(nees.mean()),
+        inside_95_pct=_share_pct(nees <= CHI2_95_TWO),
+        windows=len(nees),
+        along_nees=float(np.mean([error.along_nees for error in errors])),
+        across_nees=float(np.mean([error.across_nees for error in errors])),
+        height_nees=None if heights is None else float(heights.mean()),
+        height_inside_95_pct=None if heights is None else _share_pct(heights <= CHI2_95_ONE),
+    )
+
+
+def _share_pct(inside: npt.NDArray[np.bool_]) -> float:
+    return 100.0 * float(np.mean(inside))
 
 
 def _known_stances(chain: StepChain, truth: Truth) -> tuple[list[int], FloatArray]:
@@ -150,12 +213,41 @@ def _windows(time_s: FloatArray) -> list[tuple[int, int]]:
     return [(a, b) for a, b in pairs if time_s[b] - time_s[a] <= _WINDOW_AT_MOST_S]
 
 
-def _nees(chain: StepChain, window: tuple[int, int], true_m: FloatArray, fit_response: FloatArray) -> float:
-    """rᵀ Cov(r)⁻¹ r of one window; ``true_m`` is the true displacement turned into the estimate's frame."""
+def _error(chain: StepChain, window: tuple[int, int], true_m: FloatArray, fit_response: FloatArray) -> _Error:
+    """A window's error in units of its covariance; ``true_m`` is the true displacement in the estimate's frame."""
     a, b = window
-    residual = true_m - (chain.position_m[b] - chain.position_m[a])
-    covariance = displacement_covariance(chain, a, b, fit_response)
-    return float(residual @ np.linalg.solve(covariance + _FLOOR_M2 * np.eye(2), residual))
+    way = chain.position_m[b] - chain.position_m[a]
+    residual = true_m - way
+    covariance = displacement_covariance(chain, a, b, fit_response) + _FLOOR_M2 * np.eye(2)
+    along, across = way, turned(way)
+    return _Error(
+        nees=float(residual @ np.linalg.solve(covariance, residual)),
+        along_nees=_component_nees(residual, covariance, along),
+        across_nees=_component_nees(residual, covariance, across),
+    )
+
+
+def _component_nees(residual: FloatArray, covariance: FloatArray, direction: FloatArray) -> float:
+    """The squared component over its variance; of no direction, nothing."""
+    variance = float(direction @ covariance @ direction)
+    return float(residual @ direction) ** 2 / variance if variance > 0.0 else 0.0
+
+
+def _height_nees(chain: StepChain, truth: Truth, windows: list[tuple[int, int]]) -> FloatArray | None:
+    """Squared error of each window's climb over its variance, (k,); None if the truth has no heights."""
+    if not is_dense(truth) or np.ptp(truth.position_m[:, 2]) < _FLAT_M:
+        return None
+    climb = np.broadcast_to(chain.climb_m, chain.heading_change_rad.shape)
+    length = np.linalg.norm(chain.displacement_m, axis=1)
+    shared = np.column_stack([chain.common_scale * climb, chain.common_slope * length])
+    own = chain.climb_variance_m2 - (shared**2).sum(axis=1)
+    true = np.interp(chain.time_s, truth.time_s, truth.position_m[:, 2])
+    nees = [
+        (climb[a:b].sum() - true[b] + true[a]) ** 2
+        / (own[a:b].sum() + (shared[a:b].sum(axis=0) ** 2).sum() + _FLOOR_M2)
+        for a, b in windows
+    ]
+    return np.array(nees)
 
 
 def displacement_covariance(chain: StepChain, a: int, b: int, fit_response: FloatArray) -> FloatArray:
@@ -167,4 +259,5 @@ def displacement_covariance(chain: StepChain, a: int, b: int, fit_response: Floa
     response[a:b, :, 2] = turned(position[b] - position[a + 1 : b + 1])
     response[:a, :, 2] = lever
     response -= lever[None, :, None] * fit_response[:, None, :]
-    return np.asarray(np.einsum("nij,njk,nlk->il", response, chain.covariance, response))
+    shared = np.einsum("nij,nkj->ik", response, chain.common)
+    return np.asarray(np.einsum("nij,njk,nlk->il", response, chain.own, response) + shared @ shared.T)

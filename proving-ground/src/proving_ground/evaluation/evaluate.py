@@ -37,13 +37,17 @@ KINDS: tuple[Kind, ...] = ("foot", "dual")
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What an estimator made of a run: its track, its steps (None if it has none) and what it cost."""
+    """What an estimator made of a run: its track, its steps (None if it has none) and what it cost.
+
+    ``told``: the same steps with all that the estimator says of them.
+    """
 
     track: Track
     steps: StepChain | None
     strides: int | None
     samples: int
     seconds: float
+    told: Sequence["FootStepEstimate"] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +165,7 @@ def estimate_foot(imu: ImuSeries, method: str) -> Estimate:
         strides=count_strides(np.array([step.displacement_m for step in steps]).reshape(-1, 3)),
         samples=len(time_ns),
         seconds=seconds,
+        told=steps,
     )
 
 
@@ -205,6 +210,11 @@ def _chain(steps: Sequence["FootStepEstimate"]) -> StepChain | None:
         displacement_m=np.array([step.displacement_m[:2] for step in steps]),
         heading_change_rad=np.array([step.heading_change_rad for step in steps]),
         covariance=np.array([np.asarray(step.covariance)[horizontal] for step in steps]),
+        common_scale=np.array([step.common_scale_sigma for step in steps]),
+        common_turn_rad_s=np.array([step.common_turn_sigma_rad_s for step in steps]),
+        common_slope=np.array([step.common_slope_sigma for step in steps]),
+        climb_m=np.array([step.displacement_m[2] for step in steps]),
+        climb_variance_m2=np.array([step.covariance[2, 2] for step in steps]),
     )
 
 

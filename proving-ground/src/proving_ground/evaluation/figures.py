@@ -14,6 +14,7 @@ from proving_ground.evaluation.ablation import ABLATIONS, plain, rmse_of
 from proving_ground.evaluation.benchmark import measure, walk_of
 from proving_ground.evaluation.cross_fit import cross_fit
 from proving_ground.evaluation.evaluate import FUSED, Evaluated, evaluate_task, plan
+from proving_ground.evaluation.foot_motion_page import motion_findings
 from proving_ground.evaluation.foot_page import Findings, page
 from proving_ground.evaluation.foot_plots import save_shares, save_tracks
 from proving_ground.evaluation.train_stance import training_runs
@@ -21,6 +22,8 @@ from sensor_gateway.recordings import load_runs
 from sensor_gateway.recordings.run import Run
 
 SETS = ("pyshoe-vicon", "foot-gcp", "xio-gait", "gaitmap-example", "dualfoot-fgo")
+# Recordings of stairs, without truth: they belong to no set.
+STAIRS = tuple(f"gaitmap-example/imu_sample_healthy_stair_{way}.csv" for way in ("up", "down"))
 WALKED = SETS[:2]  # the sets with enough runs to compare methods and choices by
 DEFAULT = FootSettings().method
 _TURNS = 3
@@ -62,10 +65,20 @@ def main(data: Path, docs: Path) -> None:
         ablation={
             one.name: {variant.name: rmse_of(variant, one.runs) for variant in ABLATIONS} for one in walked
         },
+        motion=motion_findings(
+            {one.name: one.by(DEFAULT) for one in sets},
+            [run for name in STAIRS for run in climbed(data / name)],
+        ),
         cost=measure(walk_of(None), _TURNS),
         cross_fit=cross_fit(data) if len(training_runs(data)) >= _CROSS_FIT_RUNS else None,
     )
     (docs / "foot-ins.md").write_text(page(findings), encoding="utf-8")
+
+
+def climbed(path: Path) -> list[Evaluated]:
+    """Both feet of a recording on stairs by the default; none if it is not there."""
+    runs = load_runs([path]) if path.is_file() else []
+    return [evaluate_task(task, "best-fit") for task in plan(runs, "foot", [DEFAULT])] if runs else []
 
 
 def evaluated_set(path: Path) -> DataSet:

@@ -11,6 +11,7 @@ from pdr_engine.foot.presets import REFERENCE, SENSORS
 from proving_ground.evaluation.benchmark import LIMITS, FootFigures
 from proving_ground.evaluation.cross_fit import summary
 from proving_ground.evaluation.evaluate import Row
+from proving_ground.evaluation.foot_motion_page import MotionFindings, classes, covariance
 from proving_ground.evaluation.train_stance import SET
 
 Errors = Mapping[str, Sequence[float]]
@@ -54,7 +55,8 @@ class Findings:
 
     ``rows``: every foot by every method. ``runs``: rows of the default, fused ones at the end. ``plain`` and
     ``ablation``: RMSE of every foot, by method in the plain filter and by variant. ``cost``: the benchmark.
-    ``cross_fit``: RMSE of the training set's runs, each with weights that have not seen it; None without the set.
+    ``motion``: classes and covariance of the default's steps. ``cross_fit``: RMSE of the training set's runs, each
+    with weights that have not seen it; None without the set.
     """
 
     rows: Mapping[str, Sequence[Row]]
@@ -62,6 +64,7 @@ class Findings:
     plain: Mapping[str, Errors]
     ablation: Mapping[str, Errors]
     cost: FootFigures
+    motion: MotionFindings
     cross_fit: Sequence[float] | None = None
 
 
@@ -75,6 +78,8 @@ def page(findings: Findings) -> str:
         _all_methods(findings),
         _ablation(findings),
         _pictures(),
+        classes(findings.motion),
+        covariance(findings.motion),
         _sensors(),
         _cost(findings.cost),
         *(_runs(name, rows) for name, rows in findings.runs.items()),
@@ -114,7 +119,11 @@ def _how() -> str:
   `adaptive` compares the SHOE statistic over {1e3 * d.shoe_window_s:g} ms with a threshold that stays for
   {d.adaptive_hold_s:g} s after a zero-velocity update and then grows by e^({d.adaptive_rate_per_s:g}·t).
 - **Covariance.** What zero-velocity updates hide (a velocity of σ that lasts {f.hidden_motion_s:g} s) and
-  {100 * f.step_scale:g} % of each step's length are part of it.
+  {100 * f.step_scale:g} % of each step's length are part of it. A landing that surprises widens it as under
+  Student's t, and so does the kind of motion; scale, slope and turn errors that all steps share are told apart
+  (`pdr_engine.foot.uncertainty`).
+- **Each step** also tells its class and direction, length, clearance (the swing's heights after the landing has
+  corrected them), swing and stance times, and its quality (detector and landing).
 - **Clipped gyros.** A peak that the sensor has cut off is rebuilt between its flanks (cubic Hermite), and its
   axis is doubted while it lasts.
 - **Alignment.** Attitude and gyro bias come from {a.window_s:g} s that are *verified* still, or after

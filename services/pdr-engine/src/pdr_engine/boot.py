@@ -90,6 +90,17 @@ class Boot:
             motion=step.motion,
             stance_quality=step.stance_quality,
             realigned=step.realigned,
+            direction=step.direction,
+            length_m=step.length_m,
+            horizontal_length_m=step.horizontal_length_m,
+            clearance_m=step.clearance_m,
+            swing_s=step.swing_s,
+            stance_s=step.stance_s,
+            landing_nis=step.landing_nis,
+            quality_pct=step.quality_pct,
+            common_scale_sigma=step.common_scale_sigma,
+            common_slope_sigma=step.common_slope_sigma,
+            common_turn_sigma_rad_s=step.common_turn_sigma_rad_s,
         )
         self._steps += 1
         cosine, sine = math.cos(self._yaw_rad), math.sin(self._yaw_rad)

@@ -63,7 +63,7 @@ def step_covariance(triangle: tuple[float, ...]) -> Array | None:
 
 
 def unmodelled(displacement_m: Vector3, duration_s: float, boots: FeetConfig) -> Array:
-    """Variances (4, 4) for what steps have in common (scale, gyro bias) and their own covariance leaves out.
+    """Variances (4, 4) for what steps have in common (scale, gyro bias): their own covariance holds it once a step.
 
     Such errors correlate from step to step, white noise does not; so the defaults are larger than one step's
     share, to be right after minutes of walking rather than after one step.

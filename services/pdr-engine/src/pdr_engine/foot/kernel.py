@@ -191,6 +191,7 @@ def zero_velocity(s: Record, p: Record, at: int, dt: float) -> None:
     nis = 0.0
     for k in range(3):
         nis += y[k] * (S[k, 0] * y[0] + S[k, 1] * y[1] + S[k, 2] * y[2])
+    s.nis = nis
     trust = min(1.0, p.gate / math.sqrt(max(nis, 1e-12)))
     for i in range(STATES):
         for k in range(3):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bootprint.messages import Direction, MotionClass
 from pdr_engine.foot.settings import METHODS, FootSettings
 
 RING = 2048
@@ -95,6 +96,28 @@ STATE = np.dtype(
         ("stance_doubt", "f8"),
         ("in_stance", "i8"),
         ("realigned", "i8"),
+        # what the running stride is like (`strides`)
+        ("flight", "f8", (RING, 3)),  # the foot's place in swing, m
+        ("predicted", "f8", 3),  # place before the update at hand
+        ("correction", "f8", 3),  # what updates have moved the place by since the foot landed, m
+        ("swing", "i8"),  # first sample of the step's first swing, and of its newest
+        ("lifted", "i8"),
+        ("landed", "i8"),  # last sample of its newest; none if below ``lifted``
+        ("rest_since_ns", "i8"),  # the stance that is or was last
+        ("rest_until_ns", "i8"),
+        ("up", "f8", 3),  # sum of the vertical in sensor axes over that stance
+        ("nis", "f8"),  # of the newest update, and the worst of the step in that stance
+        ("worst_nis", "f8"),
+        ("rest_up", "f8", 3),  # the vertical in sensor axes when the foot was lifted
+        ("steep_up", "f8", 3),  # ... and when it was tilted most against that
+        ("steep_cosine", "f8"),
+        ("peak_rate", "f8"),  # squares, in the step's swing: (rad/s)², (m/s²)²
+        ("peak_force", "f8"),
+        # how this foot usually is (`motion`)
+        ("upright", "f8", 3),  # the vertical in sensor axes when it stands flat
+        ("last_up", "f8", 3),  # the same in the stance before
+        ("unsteady", "f8"),  # running mean square of the angle between stances, rad²
+        ("ahead", "f8", 2),  # where its toes point, in the heading's axes; the longer, the surer
         # counts
         ("estimates", "i8"),
         ("steps", "i8"),
@@ -126,6 +149,23 @@ STEP = np.dtype(
         ("swing_ns", "i8"),
         ("doubt", "f8"),
         ("realigned", "?"),
+        ("stance_ns", "i8"),  # the stance at the step's end
+        ("clearance_m", "f8"),
+        ("nis", "f8"),  # worst in that stance
+        ("tilt_rad", "f8"),  # of the resting foot against one that stands flat
+        ("pitch_rad", "f8"),  # largest tilt in swing against the stance before
+        ("unsteady_rad", "f8"),
+        ("peak_rate_rad_s", "f8"),
+        ("peak_force_m_s2", "f8"),
+        ("quality_pct", "f8"),
+        (
+            "common_scale",
+            "f8",
+        ),  # 1 sigma of what all steps share: of the length, of the ground's slope, a turn
+        ("common_slope", "f8"),
+        ("common_turn_rad_s", "f8"),
+        ("motion", "i8"),  # place in MOTIONS
+        ("direction", "i8"),  # place in DIRECTIONS
     ],
     align=True,
 )
@@ -144,6 +184,9 @@ _FLOATS = (
 _INTEGERS = ("method", "window_ns", "calm_hold_ns", "still_window_ns", "patience_ns", "stop_ns", "report_ns")
 PARAMETERS = np.dtype([(name, "f8") for name in _FLOATS] + [(name, "i8") for name in _INTEGERS], align=True)
 
+MOTIONS: tuple[MotionClass, ...] = ("standing", "walking", "running", "stairs", "crawling", "unknown")
+STANDING, WALKING, RUNNING_GAIT, STAIRS, CRAWLING, UNKNOWN = range(6)
+DIRECTIONS: tuple[Direction | None, ...] = (None, "forward", "left", "backward", "right")
 LEARNED, ADAPTIVE, SHOE, GYRO, DIFFERENTIAL, ARED = range(6)
 
 

@@ -18,17 +18,18 @@ from pdr_engine.foot.memory import (
     ALIGNING,
     CLIP_LAG_NS,
     GAP_NS,
-    HEADING,
     LATENCY_NS,
     LEARNED,
     MASK,
     NS,
-    POSITION,
     RUNNING,
     STANCE_END_NS,
 )
+from pdr_engine.foot.motion import classify
 from pdr_engine.foot.quaternion import assign, twist, wrapped
 from pdr_engine.foot.stance import detect
+from pdr_engine.foot.strides import begin_alignment, begin_stride, describe_stride, follow, vertical
+from pdr_engine.foot.uncertainty import widen, write_covariance
 
 STOP_BLOCK_NS = 500_000_000  # a stop is verified block by block
 STRIDE_AT_LEAST_NS = 350_000_000  # the strides of a sprint take 0.4 s: what ends sooner is not a step yet
@@ -130,10 +131,12 @@ def _use(s: Record, p: Record, at: int, estimates: Any, steps: Any) -> None:
         propagate(s, p, at, dt, dt > GAP_NS * NS)
         if s.still[place]:
             creep(s, p, at, dt)
+            assign(s.predicted, s.position)
             zero_velocity(s, p, at, dt)
     if _diverged(s, p):
         _recover(s, at)
         return
+    follow(s, at)
     s.done += 1
     s.yaw = twist(s.attitude, s.reference)
     _write_estimate(s, at, estimates)
@@ -150,6 +153,8 @@ def _begin(s: Record, at: int) -> None:
     if s.began == 0:
         s.began = 1
         s.step_yaw = twist(s.attitude, s.reference)
+        assign(s.upright, vertical(s))
+    begin_alignment(s, at)
 
 
 @compiled
@@ -263,33 +268,15 @@ def _hand_over(s: Record, p: Record, at: int, steps: Any) -> None:
     row.displacement_m[1] = cosine * y - sine * x
     row.displacement_m[2] = s.position[2] - s.step_position[2]
     row.heading_change_rad = wrapped(s.yaw - s.step_yaw)
-    _write_covariance(s, p, row, cosine, sine)
+    write_covariance(s, p, row, cosine, sine)
     row.swing_ns = s.step_swing_ns
     row.doubt = s.stance_doubt / max(1, s.stance_samples)
     row.realigned = s.realigned != 0
+    describe_stride(s, row)
+    classify(s, row)
+    widen(row)
     s.steps += 1
     _next_step(s, at)
-
-
-@compiled
-def _write_covariance(s: Record, p: Record, row: Record, cosine: float, sine: float) -> None:
-    """The 4x4 covariance of (forward, left, up, heading): the filter's in the step's axes, and scale errors."""
-    square = 0.0
-    for i in range(4):
-        a = HEADING if i == 3 else POSITION + i
-        for j in range(4):
-            b = HEADING if j == 3 else POSITION + j
-            row.covariance[i, j] = s.P[a, b]
-    for axis in range(3):
-        square += row.displacement_m[axis] ** 2
-    for axis in range(3):
-        row.covariance[axis, axis] += p.step_scale**2 * square
-    for j in range(4):
-        x, y = row.covariance[0, j], row.covariance[1, j]
-        row.covariance[0, j], row.covariance[1, j] = cosine * x + sine * y, cosine * y - sine * x
-    for i in range(4):
-        x, y = row.covariance[i, 0], row.covariance[i, 1]
-        row.covariance[i, 0], row.covariance[i, 1] = cosine * x + sine * y, cosine * y - sine * x
 
 
 @compiled
@@ -301,4 +288,5 @@ def _next_step(s: Record, at: int) -> None:
     s.stance_doubt = 0.0
     s.stance_samples = 0
     s.realigned = 0
+    begin_stride(s, at)
     forget_place(s)
