@@ -147,7 +147,7 @@ def test_the_page_is_made_from_a_folder_of_sets(
 ) -> None:
     """From the walk to the page and its pictures; the cost is not this test's matter."""
     monkeypatch.setattr(figures, "measure", lambda *_: COST)
-    figures.main(square.parent, tmp_path)
+    figures.main(square.parent, tmp_path, seeds=())
     text = (tmp_path / "foot-ins.md").read_text(encoding="utf-8")
     assert "## pyshoe-vicon, run by run" in text
     assert "| pyshoe-vicon/fused |" in text

@@ -24,7 +24,7 @@ def play_run(
 ) -> MemoryBus:
     """Play a whole run through pdr-engine and fusion; the bus's journal holds all that was said."""
     bus = MemoryBus()
-    engine = EngineCore(pdr, identity)
+    engine = EngineCore(pdr, identity, origin)
     fuser = FusionCore(fusion, identity, origin)
     _attach(bus, engine, identity, PDR_SUBJECTS)
     _attach(bus, fuser, identity, FUSION_SUBJECTS)

@@ -183,6 +183,10 @@ class FootStep(Message, frozen=True):
     the displacement, a rise of ``common_slope_sigma`` of its horizontal length and a turn of
     ``common_turn_sigma_rad_s`` of the duration (1 σ). Over many steps the common part grows with their sum, not
     with its root.
+
+    ``magnetic_azimuth_rad``: azimuth from *true* north of the axis that is "forward" at the step's end (not of the
+    boot's toe: the axis is the sensor's, as mounted), as the magnetometer alone saw it in this stance. Only where
+    the field could be trusted; errs alike over some metres and by what calibration left, and its sigma says so.
     """
 
     start_time_ns: TimeNs
@@ -203,6 +207,8 @@ class FootStep(Message, frozen=True):
     common_scale_sigma: NonNegative | None = None
     common_slope_sigma: NonNegative | None = None
     common_turn_sigma_rad_s: NonNegative | None = None
+    magnetic_azimuth_rad: float | None = None
+    magnetic_azimuth_sigma_rad: NonNegative | None = None
 
 
 class FootPose(Message, frozen=True):

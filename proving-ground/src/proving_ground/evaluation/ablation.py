@@ -55,6 +55,8 @@ ABLATIONS = (
     Variant("stance as sure as at rest wherever it is", {"filter": {"learned_noise": 0.0}}),
     Variant("growing threshold instead of the learned detector", {"method": "adaptive"}),
     Variant("threshold that does not grow", {"method": "adaptive", "detector": {"adaptive_rate_per_s": 0.0}}),
+    Variant("without the magnetometer at stand-still", {"magnetometer": {"use": False}}),
+    Variant("magnetometer however disturbed its field", {"magnetometer": {"disturbed_share": _NEVER}}),
     Variant("plain nine-state filter, learned detector", PLAIN),
 )
 

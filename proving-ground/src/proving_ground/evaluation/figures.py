@@ -17,6 +17,7 @@ from proving_ground.evaluation.evaluate import FUSED, Evaluated, evaluate_task, 
 from proving_ground.evaluation.foot_motion_page import motion_findings
 from proving_ground.evaluation.foot_page import Findings, page
 from proving_ground.evaluation.foot_plots import save_shares, save_tracks
+from proving_ground.evaluation.long_walks import SEEDS, compare_all
 from proving_ground.evaluation.train_stance import training_runs
 from sensor_gateway.recordings import load_runs
 from sensor_gateway.recordings.run import Run
@@ -48,8 +49,8 @@ class DataSet:
         return [float(rmse) for e in self.by(method) if (rmse := e.row["rmse_m"]) is not None]
 
 
-def main(data: Path, docs: Path) -> None:
-    """Write the page for the sets that are in ``data``."""
+def main(data: Path, docs: Path, seeds: Sequence[int] = SEEDS) -> None:
+    """Write the page for the sets that are in ``data``; ``seeds`` are those of the simulated long walks."""
     logs.configure("error")
     images = docs / "img"
     images.mkdir(parents=True, exist_ok=True)
@@ -71,6 +72,7 @@ def main(data: Path, docs: Path) -> None:
         ),
         cost=measure(walk_of(None), _TURNS),
         cross_fit=cross_fit(data) if len(training_runs(data)) >= _CROSS_FIT_RUNS else None,
+        long_walks=compare_all(seeds) if seeds else {},
     )
     (docs / "foot-ins.md").write_text(page(findings), encoding="utf-8")
 

@@ -5,6 +5,8 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from bootprint.bus import Envelope
+from bootprint.config import Origin
+from bootprint.geomagnetism import earth_field
 from bootprint.messages import FootPose, FootStep, ImuBatch, Vector3, upper_triangle
 from bootprint.topics import Address
 from pdr_engine.foot import FootEstimates, FootNavigator, FootSettings, FootStepEstimate
@@ -16,11 +18,16 @@ class Boot:
     """The navigator of one place with the books that messages need.
 
     Steps are numbered from 0. Poses lie on a fixed grid of event time (the first sample at or after each of its
-    points), begin with the first step, and are relative to the newest step at or before their time.
+    points), begin with the first step, and are relative to the newest step at or before their time. With an
+    ``origin`` azimuths are told, by the declination there when the first magnetic sample comes.
     """
 
-    def __init__(self, settings: FootSettings, imu: Address, pose_interval_s: float) -> None:
-        self._navigator = FootNavigator(settings)
+    def __init__(
+        self, settings: FootSettings, imu: Address, pose_interval_s: float, origin: Origin | None = None
+    ) -> None:
+        self._navigator = FootNavigator(settings, settings.magnetometer.calibration(imu.source))
+        self._origin = origin
+        self._declination_rad: float | None = None
         self._step_address = imu.with_subject("foot_step")
         self._pose_address = imu.with_subject("foot_pose")
         self._grid_ns = round(pose_interval_s * NS_PER_S)
@@ -38,7 +45,10 @@ class Boot:
         """Take a batch in; steps and poses that it makes known come out."""
         times = batch.times
         self._measure_rate(int(times[-1]), len(times))
-        return self._publish(self._navigator.process(times, batch.accel, batch.gyro, batch.mag))
+        mag = batch.mag
+        if mag is not None and self._declination_rad is None:
+            self._learn_earth_field(int(times[0]))
+        return self._publish(self._navigator.process(times, batch.accel, batch.gyro, mag))
 
     def close(self) -> Iterable[Envelope]:
         """The end of the stream: what still waited."""
@@ -47,6 +57,13 @@ class Boot:
     def counters(self) -> dict[str, int]:
         """Counts since the start."""
         return {**self._navigator.counters(), "steps": self._steps}
+
+    def _learn_earth_field(self, time_ns: int) -> None:
+        """It changes too slowly to be asked for again."""
+        if self._origin is not None:
+            field = earth_field(self._origin, time_ns)
+            self._navigator.know_earth_field(field)
+            self._declination_rad = field.declination_rad
 
     def _measure_rate(self, newest_ns: int, count: int) -> None:
         self.newest_ns = newest_ns
@@ -101,6 +118,8 @@ class Boot:
             common_scale_sigma=step.common_scale_sigma,
             common_slope_sigma=step.common_slope_sigma,
             common_turn_sigma_rad_s=step.common_turn_sigma_rad_s,
+            magnetic_azimuth_rad=self._true_azimuth(step),
+            magnetic_azimuth_sigma_rad=step.magnetic_azimuth_sigma_rad,
         )
         self._steps += 1
         cosine, sine = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
@@ -108,6 +127,11 @@ class Boot:
         self._position = (x + cosine * forward - sine * left, y + sine * forward + cosine * left, z + up)
         self._yaw_rad += step.heading_change_rad
         return Envelope(self._step_address, message)
+
+    def _true_azimuth(self, step: FootStepEstimate) -> float | None:
+        if step.magnetic_azimuth_rad is None or self._declination_rad is None:
+            return None
+        return (step.magnetic_azimuth_rad + self._declination_rad) % (2.0 * math.pi)
 
     def _pose(self, row: Any) -> Envelope:
         cosine, sine = math.cos(self._yaw_rad), math.sin(self._yaw_rad)

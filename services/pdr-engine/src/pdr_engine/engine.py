@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from bootprint.bus import Envelope
+from bootprint.config import Origin
 from bootprint.figures import Figures
 from bootprint.messages import ImuBatch
 from bootprint.topics import Identity
@@ -14,11 +15,14 @@ SUBJECTS = ("imu",)
 
 
 class EngineCore:
-    """One soldier's boots. Outputs depend on the messages alone; `tick` only tells figures what time it is."""
+    """One soldier's boots. Outputs depend on the messages alone; `tick` only tells figures what time it is.
 
-    def __init__(self, config: PdrConfig, identity: Identity) -> None:
+    ``origin`` is the realm's: with it, steps tell magnetic azimuths from true north.
+    """
+
+    def __init__(self, config: PdrConfig, identity: Identity, origin: Origin | None = None) -> None:
         self._boots = {
-            place: Boot(config.foot, identity.address("imu", place), config.pose_interval_s)
+            place: Boot(config.foot, identity.address("imu", place), config.pose_interval_s, origin)
             for place in config.feet
         }
         self._silent_after_ns = round(config.silent_after_s * NS_PER_S)

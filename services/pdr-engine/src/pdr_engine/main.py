@@ -12,7 +12,7 @@ def build(context: Context) -> Part:
     config = computer.section("pdr", PdrConfig)
     if reason := warm_up():
         context.log.warning("numba runs the foot filter in this process, in more memory", reason=reason)
-    return CorePart(EngineCore(config, computer.identity))
+    return CorePart(EngineCore(config, computer.identity, computer.realm.origin))
 
 
 SERVICE = Service(

@@ -99,6 +99,7 @@ def _walked(bind: Any) -> Tables:
     tables.batch["accel"] = np.outer(swing, [25.0, 1.0, 12.0])
     tables.batch["accel"][:, 2] += 9.81
     tables.batch["gyro"] = np.outer(swing, [0.5, 8.0, 0.3])
+    tables.batch["mag"] = np.outer(1.0 + 0.1 * np.sin(seconds), [15.0, 5.0, -40.0])
     bind(tables)(CHUNK, True)
     return tables
 

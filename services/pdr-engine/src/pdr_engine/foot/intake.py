@@ -49,6 +49,7 @@ def push(s: Record, sample: Record) -> None:
     for axis in range(3):
         s.accel[place, axis] = sample.accel[axis]
         s.gyro[place, axis] = sample.gyro[axis]
+        s.mag[place, axis] = sample.mag[axis]
         s.clipped[place, axis] = 0
     s.still[place] = 0
     s.dropped_in_a_row = 0

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bootprint.messages import Direction, MotionClass
-from pdr_engine.foot.settings import METHODS, FootSettings
+from pdr_engine.foot.settings import METHODS, UNCALIBRATED, FootSettings, MagnetometerCalibration
 
 RING = 2048
 MASK = RING - 1
@@ -28,6 +28,9 @@ ALIGNING, RUNNING = 0, 1
 CLIP_LAG_NS = 35_000_000  # look-ahead of the cleaning stage
 LATENCY_NS = 95_000_000  # look-ahead of the whole: the house allows 100 ms
 STANCE_END_NS = 20_000_000  # a stance has ended when nothing within this time belongs to it
+AID_STATES = 6  # of the outer filter that the magnetometer feeds
+AID_PSI, AID_DRIFT, AID_FIELD, AID_IRON = 0, 1, 2, 4  # rad, rad/s, µT (2, nav), µT (2, foot of yaw 0)
+STANDING_SWING_NS = 120_000_000  # the foot was not lifted for longer than this
 GAP_NS = 50_000_000
 LONG_GAP_NS = 1_000_000_000
 NS = 1e-9
@@ -50,6 +53,7 @@ STATE = np.dtype(
         ("time_ns", "i8", RING),
         ("accel", "f8", (RING, 3)),
         ("gyro", "f8", (RING, 3)),
+        ("mag", "f8", (RING, 3)),  # µT, NaN where unknown
         ("clipped", "u1", (RING, 3)),
         ("still", "u1", RING),
         ("sums", "f8", (RING, 8)),  # running sums for the learned detector
@@ -118,6 +122,33 @@ STATE = np.dtype(
         ("last_up", "f8", 3),  # the same in the stance before
         ("unsteady", "f8"),  # running mean square of the angle between stances, rad²
         ("ahead", "f8", 2),  # where its toes point, in the heading's axes; the longer, the surer
+        # the stance's field, and the outer filter that holds the heading (µT, m, rad, s)
+        ("field_sum", "f8", 3),
+        ("field_square", "f8"),
+        ("field_samples", "i8"),
+        ("field", "f8", 3),  # mean over the stance, nav axes
+        ("field_strength", "f8"),  # its mean square: the sensor's own, whatever the attitude
+        ("field_scatter", "f8"),
+        ("fresh", "f8"),  # how new this place is: 0 at the same spot, 1 far away
+        ("places", "f8"),  # how many independent places have been judged, the older ones counting less
+        ("deviation", "f8"),  # this place's square from what is usual
+        ("disturbance_sum", "f8"),
+        ("disturbance", "f8"),  # variance of one component from place to place
+        ("usual_horizontal", "f8"),
+        ("usual_vertical", "f8"),
+        ("judged_place", "f8", 3),
+        ("aid_known", "i8"),  # 1 once there is a reference
+        ("aid_place", "f8", 3),  # where the field was last used
+        ("aid_x", "f8", AID_STATES),
+        ("aid_P", "f8", (AID_STATES, AID_STATES)),
+        ("aid_h", "f8", AID_STATES),
+        ("aid_cross", "f8", AID_STATES),
+        ("aid_bias", "f8", 3),  # the gyro bias that the drift counts from
+        ("aid_bias_variance", "f8"),
+        ("magnetic_azimuth", "f8"),
+        ("magnetic_variance", "f8"),
+        ("fields_used", "i8"),
+        ("fields_refused", "i8"),
         # counts
         ("estimates", "i8"),
         ("steps", "i8"),
@@ -132,7 +163,7 @@ STATE = np.dtype(
     align=True,
 )
 
-SAMPLE = np.dtype([("time_ns", "i8"), ("accel", "f8", 3), ("gyro", "f8", 3)], align=True)
+SAMPLE = np.dtype([("time_ns", "i8"), ("accel", "f8", 3), ("gyro", "f8", 3), ("mag", "f8", 3)], align=True)
 
 ESTIMATE = np.dtype(
     [("time_ns", "i8"), ("position_m", "f8", 3), ("speed_m_s", "f8"), ("yaw_rad", "f8"), ("stance", "?")],
@@ -166,6 +197,8 @@ STEP = np.dtype(
         ("common_turn_rad_s", "f8"),
         ("motion", "i8"),  # place in MOTIONS
         ("direction", "i8"),  # place in DIRECTIONS
+        ("magnetic_azimuth", "f8"),  # of the step's axes at its end; NaN where unknown
+        ("magnetic_variance", "f8"),
     ],
     align=True,
 )
@@ -180,9 +213,24 @@ _FLOATS = (
     # alignment
     *("still_accel_std", "still_gyro_std", "still_rate", "still_gravity", "tilt_sigma", "quiet_tilt_sigma"),
     *("sway", "bias_walk"),
+    # magnetometer
+    *("mag_floor", "mag_prior", "mag_disturbed", "mag_correlation", "mag_steadiness", "mag_iron", "mag_gate"),
+    *("mag_drift_sigma", "earth_horizontal", "earth_vertical"),
 )
-_INTEGERS = ("method", "window_ns", "calm_hold_ns", "still_window_ns", "patience_ns", "stop_ns", "report_ns")
-PARAMETERS = np.dtype([(name, "f8") for name in _FLOATS] + [(name, "i8") for name in _INTEGERS], align=True)
+_INTEGERS = (
+    "method",
+    "window_ns",
+    "calm_hold_ns",
+    "still_window_ns",
+    "patience_ns",
+    "stop_ns",
+    "report_ns",
+    "mag_use",
+)
+_TABLES = (("mag_offset", "f8", 3), ("mag_matrix", "f8", (3, 3)))
+PARAMETERS = np.dtype(
+    [*((name, "f8") for name in _FLOATS), *((name, "i8") for name in _INTEGERS), *_TABLES], align=True
+)
 
 MOTIONS: tuple[MotionClass, ...] = ("standing", "walking", "running", "stairs", "crawling", "unknown")
 STANDING, WALKING, RUNNING_GAIT, STAIRS, CRAWLING, UNKNOWN = range(6)
@@ -257,12 +305,32 @@ def _filter_values(settings: FootSettings) -> dict[str, float]:
     }
 
 
-def parameters(settings: FootSettings) -> npt.NDArray[Any]:
+def _magnetometer_values(settings: FootSettings) -> dict[str, float]:
+    m = settings.magnetometer
+    return {
+        "mag_use": m.use,
+        "mag_floor": m.disturbance_floor_ut,
+        "mag_prior": m.disturbance_prior_ut,
+        "mag_disturbed": m.disturbed_share,
+        "mag_correlation": m.correlation_m,
+        "mag_steadiness": m.steadiness_ut,
+        "mag_gate": m.gate,
+        "mag_drift_sigma": m.drift_sigma_rad_s,
+    }
+
+
+def parameters(
+    settings: FootSettings, calibration: MagnetometerCalibration = UNCALIBRATED
+) -> npt.NDArray[Any]:
     """The settings as the kernel reads them: `PARAMETERS`, shape (1,)."""
     record = np.zeros(1, PARAMETERS)
     values = _detector_values(settings) | _alignment_values(settings) | _filter_values(settings)
-    for name, value in values.items():
+    for name, value in (values | _magnetometer_values(settings)).items():
         record[name] = value
+    m = settings.magnetometer
+    record["mag_iron"] = m.uncalibrated_iron_ut if calibration == UNCALIBRATED else m.iron_ut
+    record["mag_offset"] = calibration.offset_ut
+    record["mag_matrix"] = calibration.matrix
     return record
 
 

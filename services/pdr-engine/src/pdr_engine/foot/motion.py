@@ -9,11 +9,19 @@ tilt of a swing is nose down whichever way the foot goes.
 import math
 
 from pdr_engine.foot.compiled import Record, compiled
-from pdr_engine.foot.memory import CRAWLING, NS, RUNNING_GAIT, STAIRS, STANDING, UNKNOWN, WALKING
+from pdr_engine.foot.memory import (
+    CRAWLING,
+    NS,
+    RUNNING_GAIT,
+    STAIRS,
+    STANDING,
+    STANDING_SWING_NS,
+    UNKNOWN,
+    WALKING,
+)
 from pdr_engine.foot.quaternion import assign, rotate, twist, wrapped
 from pdr_engine.foot.strides import angle_between, dot
 
-STANDING_SWING_NS = 120_000_000  # the foot was not lifted for longer than this
 STANDING_DISTANCE_M = 0.05
 # Stairs and ladders: a riser has 10 cm at least, and the way rises by a quarter (stairs: half, ramps: an eighth).
 RISER_M, SIGMAS, SLOPE = 0.10, 3.0, 0.25

@@ -5,6 +5,7 @@ points at the first alignment (the y axis, if x is steeper than 45°); yaw is th
 since the start, counter-clockwise, and so is zero there. Where north is, nobody here knows.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -12,14 +13,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bootprint.geomagnetism import EarthField
 from bootprint.messages import Float64Array, Int64Array
 from pdr_engine.foot.machine_code import load_kernel
 from pdr_engine.foot.memory import SAMPLE
-from pdr_engine.foot.settings import FootSettings
+from pdr_engine.foot.settings import UNCALIBRATED, FootSettings, MagnetometerCalibration
 from pdr_engine.foot.steps import FootStepEstimate, step_from_row
 from pdr_engine.foot.tables import CHUNK, fresh_tables
 
-COUNTERS = ("accepted", "dropped", "gaps", "clippings", "stances", "realignments")
+_FIELDS = ("fields_used", "fields_refused")  # of the magnetometer, one a stance
+COUNTERS = ("accepted", "dropped", "gaps", "clippings", "stances", "realignments", *_FIELDS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +65,18 @@ class FootNavigator:
     a second at the latest) and do not depend on how the samples are cut into batches.
     """
 
-    def __init__(self, settings: FootSettings | None = None) -> None:
+    def __init__(
+        self,
+        settings: FootSettings | None = None,
+        calibration: MagnetometerCalibration = UNCALIBRATED,
+    ) -> None:
         self.settings = settings or FootSettings()
-        tables = fresh_tables(self.settings)
-        self._state, self._estimates, self._steps = tables.state, tables.estimates, tables.steps
-        self._time_ns, self._accel, self._gyro = (tables.batch[name] for name in SAMPLE.names or ())
+        tables = fresh_tables(self.settings, calibration)
+        self._state, self._parameters = tables.state, tables.parameters
+        self._estimates, self._steps = tables.estimates, tables.steps
+        self._time_ns, self._accel, self._gyro, self._mag = (
+            tables.batch[name] for name in SAMPLE.names or ()
+        )
         self._run = load_kernel().bind(tables)
         self._made = self._state["estimates"], self._state["steps"]
 
@@ -79,27 +89,34 @@ class FootNavigator:
     ) -> FootEstimates:
         """Take a batch of any size: ``time_ns`` (n,) UTC, ``accel`` (n, 3) m/s², ``gyro`` (n, 3) rad/s.
 
-        ``mag`` (n, 3) µT is accepted and not used by this filter.
+        ``mag`` (n, 3) µT, in the axes of the other two, holds the heading where the field deserves it.
         """
         count = len(time_ns)
         if count <= CHUNK:
             self._time_ns[:count] = time_ns
             self._accel[:count] = accel
             self._gyro[:count] = gyro
+            self._mag[:count] = math.nan if mag is None else mag
             return self._feed(count, ends=False)
+        cuts = [slice(i, i + CHUNK) for i in range(0, count, CHUNK)]
         pieces = [
-            self.process(time_ns[i : i + CHUNK], accel[i : i + CHUNK], gyro[i : i + CHUNK])
-            for i in range(0, count, CHUNK)
+            self.process(time_ns[cut], accel[cut], gyro[cut], None if mag is None else mag[cut])
+            for cut in cuts
         ]
         rows = np.concatenate([piece.rows for piece in pieces])
         return FootEstimates(rows, [step for piece in pieces for step in piece.steps])
+
+    def know_earth_field(self, field: EarthField) -> None:
+        """What the field should be here: from now on steps tell their magnetic azimuth where it is like that."""
+        self._parameters["earth_horizontal"] = field.horizontal_ut
+        self._parameters["earth_vertical"] = field.up_ut
 
     def finish(self) -> FootEstimates:
         """The stream has ended: what still waited for its look-ahead."""
         return self._feed(0, ends=True)
 
     def counters(self) -> dict[str, int]:
-        """Counts since the start: samples accepted and dropped, gaps, clipped peaks, stances, realignments."""
+        """Counts since the start: of samples, gaps, clipped peaks, stances, realignments and fields."""
         return {name: int(self._state[name][0]) for name in COUNTERS}
 
     @property

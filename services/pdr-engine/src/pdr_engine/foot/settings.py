@@ -86,6 +86,46 @@ class FilterSettings(Config, frozen=True):
     max_speed_m_s: Positive = 15.0
 
 
+Row3 = tuple[float, float, float]
+IDENTITY: tuple[Row3, Row3, Row3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+class MagnetometerCalibration(Config, frozen=True):
+    """What iron on boot and sensor does to one magnetometer: field = ``matrix`` · (measured − ``offset_ut``).
+
+    `bootprint calibrate foot-magnetometer` finds both.
+    """
+
+    offset_ut: Row3 = (0.0, 0.0, 0.0)
+    matrix: tuple[Row3, Row3, Row3] = IDENTITY
+
+
+UNCALIBRATED = MagnetometerCalibration()
+
+
+class MagnetometerSettings(Config, frozen=True):
+    """When the field at stand-still may hold the heading (`foot.magnetic`), and the boots' calibrations."""
+
+    use: bool = True
+    left_foot: MagnetometerCalibration = UNCALIBRATED
+    right_foot: MagnetometerCalibration = UNCALIBRATED
+    # Disturbance of one component from place to place: at least, and until the surroundings have shown theirs.
+    disturbance_floor_ut: Positive = 1.0
+    disturbance_prior_ut: Positive = 5.0
+    disturbed_share: Positive = 0.15  # of the horizontal field: a larger disturbance (9°) is not worth using
+    correlation_m: Positive = 5.0  # places err alike over this distance
+    steadiness_ut: Positive = 2.0  # the field's standard deviation within a stance
+    iron_ut: NonNegative = 2.0  # what a calibration may have left, one sigma of each component
+    uncalibrated_iron_ut: NonNegative = 10.0  # what boot and sensor may have where nobody calibrated
+    gate: Positive = 3.0  # sigmas
+    drift_sigma_rad_s: Positive = 3e-4  # heading drift of walking itself, beyond the gyro bias: 1°/min
+
+    def calibration(self, place: str) -> MagnetometerCalibration:
+        """The calibration of the unit at a place (left_foot, right_foot)."""
+        calibrations = {"left_foot": self.left_foot, "right_foot": self.right_foot}
+        return calibrations.get(place, UNCALIBRATED)
+
+
 class FootSettings(Config, frozen=True):
     """All settings of one foot's navigator."""
 
@@ -96,6 +136,7 @@ class FootSettings(Config, frozen=True):
     detector: DetectorSettings = DetectorSettings()
     alignment: AlignmentSettings = AlignmentSettings()
     filter: FilterSettings = FilterSettings()
+    magnetometer: MagnetometerSettings = MagnetometerSettings()
 
     def __post_init__(self) -> None:
         msgspec.structs.force_setattr(self, "alignment", alignment_for(self.sensor, self.alignment))

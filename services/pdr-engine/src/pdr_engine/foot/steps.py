@@ -25,7 +25,8 @@ class FootStepEstimate:
     moved; ``stance_s``: how long it had rested at the end. ``stance_quality``: 0 to 100, how far below its
     threshold the detector was; ``landing_nis``: largest normalised innovation squared (3 components) of the stance
     at the end; ``quality_pct``: both. ``realigned``: the stream broke within this step, so it does not tell the
-    whole way.
+    whole way. ``magnetic_azimuth_rad``: of the step's forward axis at its end, clockwise from *magnetic* north,
+    None unless the field could be trusted.
     """
 
     start_time_ns: int
@@ -45,6 +46,8 @@ class FootStepEstimate:
     common_slope_sigma: float
     common_turn_sigma_rad_s: float
     realigned: bool
+    magnetic_azimuth_rad: float | None = None
+    magnetic_azimuth_sigma_rad: float | None = None
 
     @property
     def length_m(self) -> float:
@@ -59,6 +62,8 @@ class FootStepEstimate:
 
 def step_from_row(row: np.void | Any) -> FootStepEstimate:
     """A row of the kernel's `STEP` table as an estimate of its own (nothing shared with the table)."""
+    variance = float(row["magnetic_variance"])
+    told = math.isfinite(variance)
     return FootStepEstimate(
         start_time_ns=int(row["start_time_ns"]),
         time_ns=int(row["time_ns"]),
@@ -77,4 +82,6 @@ def step_from_row(row: np.void | Any) -> FootStepEstimate:
         common_slope_sigma=float(row["common_slope"]),
         common_turn_sigma_rad_s=float(row["common_turn_rad_s"]),
         realigned=bool(row["realigned"]),
+        magnetic_azimuth_rad=float(row["magnetic_azimuth"]) if told else None,
+        magnetic_azimuth_sigma_rad=math.sqrt(variance) if told else None,
     )

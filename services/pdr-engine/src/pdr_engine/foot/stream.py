@@ -14,6 +14,7 @@ from pdr_engine.foot.features import accumulate
 from pdr_engine.foot.intake import AFTER_LONG_GAP, DROPPED, judge, mend, push
 from pdr_engine.foot.kernel import creep, forget_place, mechanise, propagate, zero_velocity
 from pdr_engine.foot.learned import look
+from pdr_engine.foot.magnetic import aid_heading, begin_field, gather_field, turn_heading
 from pdr_engine.foot.memory import (
     ALIGNING,
     CLIP_LAG_NS,
@@ -26,7 +27,7 @@ from pdr_engine.foot.memory import (
     STANCE_END_NS,
 )
 from pdr_engine.foot.motion import classify
-from pdr_engine.foot.quaternion import assign, twist, wrapped
+from pdr_engine.foot.quaternion import assign, rotate, twist, wrapped
 from pdr_engine.foot.stance import detect
 from pdr_engine.foot.strides import begin_alignment, begin_stride, describe_stride, follow, vertical
 from pdr_engine.foot.uncertainty import widen, write_covariance
@@ -219,7 +220,16 @@ def _end_block(s: Record, p: Record, at: int) -> None:
     if span_ns >= p.stop_ns:
         for axis in range(3):
             s.rate[axis] = s.stop_sum[axis] / s.stop_samples
-        blend_bias(s, p, s.rate, span_ns * NS, s.stop_unrest)
+        _hold_still(s, p, span_ns * NS)
+
+
+@compiled
+def _hold_still(s: Record, p: Record, span_s: float) -> None:
+    """The stop's mean rate as a zero-angular-rate update: of the bias, and of the heading that it has turned."""
+    x, y, z = s.bias[0], s.bias[1], s.bias[2]
+    blend_bias(s, p, s.rate, span_s, s.stop_unrest)
+    learnt = rotate(s.attitude, s.bias[0] - x, s.bias[1] - y, s.bias[2] - z)[2]
+    turn_heading(s, -learnt * span_s)
 
 
 @compiled
@@ -234,10 +244,12 @@ def _watch_stance(s: Record, p: Record, at: int, steps: Any) -> None:
         return
     if s.in_stance == 0:
         s.in_stance = 1
+        begin_field(s)
         s.stance_since_ns = now_ns
         s.stances += 1
     s.stance_doubt += s.doubt[place]
     s.stance_samples += 1
+    gather_field(s, p, at)
     goes_on_long = now_ns - max(s.stance_since_ns, s.step_time_ns) >= p.report_ns
     long_enough = now_ns - s.step_time_ns >= STRIDE_AT_LEAST_NS
     if goes_on_long or (long_enough and _stance_ends(s, at)):
@@ -259,6 +271,8 @@ def _stance_ends(s: Record, at: int) -> bool:
 @compiled
 def _hand_over(s: Record, p: Record, at: int, steps: Any) -> None:
     """Write the step from the last hand-over to sample ``at``, and reset what the step has taken along."""
+    aid_heading(s, p, at)
+    begin_field(s)
     row = steps[s.steps]
     row.start_time_ns = s.step_time_ns
     row.time_ns = s.time_ns[at & MASK]
@@ -275,6 +289,8 @@ def _hand_over(s: Record, p: Record, at: int, steps: Any) -> None:
     describe_stride(s, row)
     classify(s, row)
     widen(row)
+    row.magnetic_azimuth = s.magnetic_azimuth
+    row.magnetic_variance = s.magnetic_variance
     s.steps += 1
     _next_step(s, at)
 

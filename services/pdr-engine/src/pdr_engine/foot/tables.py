@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pdr_engine.foot.memory import ESTIMATE, PARAMETERS, RING, SAMPLE, STATE, STEP, fresh_state, parameters
-from pdr_engine.foot.settings import FootSettings
+from pdr_engine.foot.settings import UNCALIBRATED, FootSettings, MagnetometerCalibration
 
 Table = npt.NDArray[Any]
 
@@ -39,11 +39,11 @@ class Tables:
                 raise ValueError(f"{name} must be {rows} contiguous rows of {dtype}")
 
 
-def fresh_tables(settings: FootSettings) -> Tables:
+def fresh_tables(settings: FootSettings, calibration: MagnetometerCalibration = UNCALIBRATED) -> Tables:
     """The tables before the first sample."""
     return Tables(
         state=fresh_state(settings),
-        parameters=parameters(settings),
+        parameters=parameters(settings, calibration),
         batch=np.zeros(CHUNK, SAMPLE),
         estimates=np.zeros(ROWS, ESTIMATE),
         steps=np.zeros(ROWS, STEP),
