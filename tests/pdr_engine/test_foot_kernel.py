@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pdr_engine.foot import kernel
-from pdr_engine.foot.memory import fresh_state, parameters
+from pdr_engine.foot.memory import fresh_state
+from pdr_engine.foot.parameters import parameters
 from pdr_engine.foot.settings import AlignmentSettings, FilterSettings, FootSettings
 from support.foot_oracle import Noise, Oracle
 
@@ -24,6 +25,7 @@ def random_oracle(rng: np.random.Generator) -> Oracle:
         position=rng.normal(size=3),
         velocity=rng.normal(size=3) * 0.1,
         lever=rng.normal(size=3) * 0.1,
+        step_position=rng.normal(size=3),
         P=root @ root.T,
     )
 
@@ -32,7 +34,7 @@ def record_of(oracle: Oracle, foot: FootSettings) -> np.record:
     state = fresh_state(foot)[0]
     x, y, z, w = oracle.attitude.as_quat()
     state["attitude"] = [w, x, y, z]
-    for name in ("position", "velocity", "lever", "P"):
+    for name in ("position", "velocity", "lever", "step_position", "P"):
         state[name] = getattr(oracle, name)
     state["gravity"], state["bias_variance"] = oracle.gravity, oracle.noise.bias_sigma**2
     return state
@@ -55,18 +57,18 @@ def test_the_kernel_computes_what_the_oracle_computes(lever_sigma: float) -> Non
     n = 400
     accel, gyro = rng.normal(size=(n, 3)) * 8.0 + [0.0, 0.0, 9.8], rng.normal(size=(n, 3)) * 3.0
     clipped, steps = rng.random((n, 3)) < 0.05, rng.uniform(0.001, 0.02, n)
-    sigma = rng.uniform(0.0, 0.2, n)
-    state["sigma"][:n] = sigma
+    sigma, motion = rng.uniform(0.0, 0.2, n), rng.normal(0.0, 0.1, (n, 2))
+    state["sigma"][:n], state["motion"][:n] = sigma, motion
     state["accel"][:n], state["gyro"][:n], state["clipped"][:n] = accel, gyro, clipped
     for k in range(1, n):
         kernel.mechanise(state, k, steps[k])
         kernel.propagate(state, p, k, steps[k], False)
-        oracle.predict(accel[k], gyro[k] - bias, steps[k], clipped[k])
+        oracle.predict(accel[k], gyro[k] - bias, steps[k], clipped[k], accel[k - 1])
         if k % 50 > 30:
             kernel.creep(state, p, k, steps[k])
             kernel.zero_velocity(state, p, k, steps[k])
             oracle.creep(sigma[k], steps[k])
-            oracle.zero_velocity(gyro[k] - bias, steps[k], sigma[k])
+            oracle.zero_velocity(gyro[k] - bias, steps[k], sigma[k], tuple(motion[k]))
         if k % 50 == 49:
             kernel.forget_place(state)
             oracle.forget_place()
@@ -90,7 +92,7 @@ def test_the_transition_is_the_derivative_of_the_motion(seed: int) -> None:
         for sign in (1.0, -1.0):
             moved = copy.deepcopy(oracle)
             moved.inject(sign * step * np.eye(12)[column])
-            moved.predict(accel, rate, dt, np.zeros(3))
+            moved.predict(accel, rate, dt, np.zeros(3), accel)
             ends.append(moved)
         np.testing.assert_allclose(ends[1].error_of(ends[0]) / (2 * step), F[:, column], atol=2e-6)
 

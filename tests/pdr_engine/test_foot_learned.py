@@ -8,8 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from pdr_engine.foot import FootSettings, weights
 from pdr_engine.foot.features import MEMORY
-from pdr_engine.foot.learned import SWING_M_S, tabulate, velocity_scale
-from pdr_engine.foot.memory import FEATURES, SAMPLE, fresh_state, parameters
+from pdr_engine.foot.learned import SWING_M_S, sole_motion, tabulate
+from pdr_engine.foot.memory import FEATURES, SAMPLE, fresh_state
+from pdr_engine.foot.parameters import parameters
 from support.foot_streams import Stream, navigate, still, turning, walk
 
 INTERVAL_S = 0.005
@@ -85,8 +86,10 @@ def test_the_network_is_one_hidden_layer() -> None:
     for features in np.random.default_rng(1).normal(-2.0, 2.0, (20, FEATURES)):
         state["features"] = features
         hidden = weights.INPUT @ features + weights.HIDDEN_BIAS
-        log_sigma = weights.BIAS + weights.OUTPUT @ (hidden / (1.0 + np.abs(hidden)))
-        assert velocity_scale(state) == pytest.approx(np.exp(np.clip(log_sigma, -6.0, 2.0)), rel=1e-9)
+        bounded = hidden / (1.0 + np.abs(hidden))
+        sigma = np.exp(np.clip(weights.BIAS + weights.OUTPUT @ bounded, -6.0, 2.0))
+        mean = sigma * (weights.MOTION_BIAS + weights.MOTION @ bounded)
+        assert sole_motion(state) == pytest.approx((sigma, *mean), rel=1e-9, abs=1e-12)
 
 
 def sigma_of(stream: Stream) -> np.ndarray:
@@ -95,7 +98,7 @@ def sigma_of(stream: Stream) -> np.ndarray:
     out = []
     for features in table(stream, np.zeros(3)):
         state["features"] = features
-        out.append(velocity_scale(state))
+        out.append(sole_motion(state)[0])
     return np.array(out)
 
 

@@ -18,7 +18,8 @@ from bootprint.topics import Identity
 from pdr_engine.config import PdrConfig
 from pdr_engine.engine import EngineCore
 from pdr_engine.foot import FootNavigator, FootSettings, FootStepEstimate, magnetic
-from pdr_engine.foot.memory import AID_STATES, fresh_state, parameters
+from pdr_engine.foot.memory import AID_STATES, fresh_state
+from pdr_engine.foot.parameters import parameters
 from pdr_engine.foot.settings import UNCALIBRATED, MagnetometerCalibration
 from proving_ground.evaluation.evaluate import evaluate_task, plan
 from proving_ground.evaluation.long_walks import (

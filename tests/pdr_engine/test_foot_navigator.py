@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pdr_engine.foot import FootNavigator, FootSettings, intake
-from pdr_engine.foot.memory import fresh_state, parameters
+from pdr_engine.foot import FootNavigator, FootSettings, clipping
+from pdr_engine.foot.memory import fresh_state
+from pdr_engine.foot.parameters import parameters
 from support.foot_streams import START_NS, Stream, Track, navigate, still, turning, walk
 
 quick = settings(max_examples=20, deadline=None)
@@ -34,9 +35,7 @@ def moved(track: Track) -> list[float]:
 
 def test_a_still_sensor_stays_where_it_is_and_its_doubt_stays_bounded() -> None:
     track = navigate(still(60.0))
-    assert np.abs(track.position_m[:, :2]).max() < 0.005
-    # The learned detector's softer update lets the height creep, 9 mm in this minute; the rules' stayed under 5 mm.
-    assert np.abs(track.position_m[:, 2]).max() < 0.01
+    assert np.abs(track.position_m).max() < 0.005
     assert {step.motion for step in track.steps} == {"standing"}
     assert len(track.steps) == pytest.approx(120, abs=2)
     deviations = np.array([np.sqrt(np.diag(step.covariance)) for step in track.steps])
@@ -166,7 +165,7 @@ def test_clipped_peaks_are_rebuilt_from_their_flanks() -> None:
     n = min(1000, len(WALK.time_ns))
     state["time_ns"][:n], state["gyro"][:n], state["head"] = cut.time_ns[:n], cut.gyro[:n], n
     for at in range(n):
-        intake.mend(state, p, at)
+        clipping.mend(state, p, at)
     lost = np.abs(cut.gyro - WALK.gyro)[:n]
     left = np.abs(state["gyro"][:n] - WALK.gyro[:n])
     assert lost[:, 1].sum() > 1.0
@@ -187,7 +186,7 @@ def test_a_short_gap_is_counted_and_doubted() -> None:
     whole, gap = navigate(WALK), navigate(WALK.only(kept))
     assert gap.counters["gaps"] == 1
     hit = next(i for i, step in enumerate(gap.steps) if step.motion != "standing")
-    assert gap.steps[hit].covariance[0, 0] > 4 * whole.steps[hit].covariance[0, 0]
+    assert gap.steps[hit].covariance[0, 0] > 2 * whole.steps[hit].covariance[0, 0]
     assert not any(step.realigned for step in gap.steps)
 
 

@@ -130,6 +130,19 @@ def test_other_places_and_subjects_are_left_to_others() -> None:
     assert core.figures().counters["other_places"] == 3
 
 
+def test_figures_tell_of_sensors_that_contradict_each_other() -> None:
+    right, mirror = walk(12), np.array([1.0, 1.0, -1.0])
+    left = Stream(right.time_ns, right.accel * mirror, right.gyro * mirror)
+    told = []
+    for stream in (right, left):
+        core = EngineCore(PdrConfig(), ME)
+        for envelope in batches(stream, "left_foot"):
+            list(core.handle(envelope))
+        told.append(core.figures())
+    assert [figures.state for figures in told] == ["ok", "degraded"]
+    assert told[1].note == "axes or units contradict each other: left_foot"
+
+
 def test_figures_tell_rates_counts_and_silence() -> None:
     core = EngineCore(PdrConfig(), ME)
     for envelope in batches(WALK, "left_foot"):

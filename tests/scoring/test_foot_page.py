@@ -116,7 +116,7 @@ def test_the_page_tells_classes_by_halves_and_the_covariance_by_set_and_class() 
 
 def test_the_page_says_what_is_training_data() -> None:
     assert "training data" not in page(findings())
-    told = page(replace(findings(), cross_fit=[0.1, 0.2, 0.6]))
+    told = page(replace(findings(), cross_fit={"one": [0.1, 0.2, 0.6]}))
     assert "mean 0.300, median 0.200, worst 0.600 m (n 3)" in told
 
 
@@ -152,6 +152,7 @@ def test_the_page_is_made_from_a_folder_of_sets(
     assert "## pyshoe-vicon, run by run" in text
     assert "| pyshoe-vicon/fused |" in text
     assert "## foot-gcp, run by run" not in text
+    assert "| 20 % missing |" in text.split("## What faults do")[1].split("##")[0]
     for name in ("foot-tracks.png", "foot-shares.png"):
         assert (tmp_path / "img" / name).read_bytes().startswith(b"\x89PNG")
         assert f"(img/{name})" in text

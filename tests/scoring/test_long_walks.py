@@ -8,8 +8,8 @@ from proving_ground.evaluation.long_walks import (
     MOUNTING,
     Comparison,
     Surroundings,
+    long_walks_table,
     magnetic_walk,
-    table,
 )
 
 
@@ -19,7 +19,7 @@ def test_the_table_s_figures_by_hand() -> None:
         Comparison((2.0, 2.5), (-0.8, 0.3)),
         Comparison((6.0, 3.0), (0.0, 0.2)),
     ]
-    lines = table({"a street": found})
+    lines = long_walks_table({"a street": found})
     assert lines[2] == "| a street | 3 | 2.00 → 2.50 | 3.00 → 2.00 | 6.00 → 3.00 | 0.40 → 0.20 | 1 |"
     assert lines[2] in _heading({"a street": found})
 

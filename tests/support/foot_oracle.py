@@ -23,12 +23,14 @@ class Noise:
 
     accel: float = 0.012
     gyro: float = 0.0006
-    accel_scale: float = 0.006
-    gyro_scale: float = 0.001
+    accel_scale: float = 0.005
+    accel_timing: float = 3e-4
+    gyro_scale: float = 0.002
     bias_sigma: float = 0.0
-    clip: float = 0.12
+    clip: float = 0.06
     velocity_sigma: float = 0.01
     learned: float = 3.0
+    motion: float = 0.5
     hidden_motion: float = 0.3
     gate: float = 3.0
 
@@ -41,6 +43,7 @@ class Oracle:
     position: np.ndarray = field(default_factory=lambda: np.zeros(3))
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     lever: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    step_position: np.ndarray = field(default_factory=lambda: np.zeros(3))
     P: np.ndarray = field(default_factory=lambda: np.zeros((12, 12)))
     gravity: float = 9.81
     noise: Noise = field(default_factory=Noise)
@@ -57,8 +60,10 @@ class Oracle:
         F[VELOCITY, ATTITUDE] = -dt * cross_matrix(force)
         return F
 
-    def predict(self, accel: np.ndarray, rate: np.ndarray, dt: float, clipped: np.ndarray) -> None:
-        """One interval of mean specific force and mean angular rate."""
+    def predict(
+        self, accel: np.ndarray, rate: np.ndarray, dt: float, clipped: np.ndarray, before: np.ndarray
+    ) -> None:
+        """One interval of mean specific force (``before``: in the interval before) and mean angular rate."""
         force = self.force(accel, rate, dt)
         motion = force - np.array([0, 0, self.gravity])
         F = self.transition(force, dt)
@@ -67,7 +72,8 @@ class Oracle:
         self.attitude = self.attitude * Rotation.from_rotvec(rate * dt)
         Q = np.zeros((12, 12))
         shaking = self.noise.accel_scale * np.linalg.norm(motion)
-        Q[VELOCITY, VELOCITY] = (self.noise.accel**2 + shaking**2) * dt * np.eye(3)
+        shock = self.noise.accel_timing * np.linalg.norm(accel - before)
+        Q[VELOCITY, VELOCITY] = ((self.noise.accel**2 + shaking**2) * dt + shock**2) * np.eye(3)
         C = self.attitude.as_matrix()
         turning = self.noise.gyro_scale * np.linalg.norm(rate)
         angle = self.noise.gyro**2 + turning**2 + self.noise.bias_sigma**2
@@ -92,9 +98,18 @@ class Oracle:
         """What stance hides: the place wanders by a velocity σ that lasts a while."""
         self.P[POSITION, POSITION] += sigma**2 * self.noise.hidden_motion * dt * np.eye(3)
 
-    def zero_velocity(self, rate: np.ndarray, dt: float, sigma: float = 0.0) -> None:
+    def expected(self, along: float, up: float) -> np.ndarray:
+        """The sole's mean velocity, given as speeds along the step's way and up; less of it after a short way."""
+        way = (self.position - self.step_position)[:2]
+        length = np.linalg.norm(way)
+        share = self.noise.motion * length / np.hypot(length, 0.3)
+        return share * np.array([*(along * way / length), up])
+
+    def zero_velocity(
+        self, rate: np.ndarray, dt: float, sigma: float = 0.0, motion: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
         """The Joseph form, with the measurement's noise inflated where the innovation passes the gate."""
-        H, y = self.jacobian(rate), -self.sole_velocity(rate)
+        H, y = self.jacobian(rate), self.expected(*motion) - self.sole_velocity(rate)
         variance = self.noise.velocity_sigma**2 + (self.noise.learned * sigma) ** 2
         S = H @ self.P @ H.T + variance * 0.005 / dt * np.eye(3)
         distance = np.sqrt(y @ np.linalg.solve(S, y))

@@ -38,7 +38,14 @@ class Variant:
 
 # The filter of D1 and of the textbooks: nine states, bias from the start alone, every measurement believed.
 PLAIN: Changes = {
-    "filter": {"lever_sigma_m": 0.0, "gate": _NEVER, "clip_rad_s": _NEVER, "accel_scale_sqrt_s": 0.0},
+    "filter": {
+        "lever_sigma_m": 0.0,
+        "gate": _NEVER,
+        "clip_rad_s": _NEVER,
+        "accel_scale_sqrt_s": 0.0,
+        "accel_timing_s": 0.0,
+        "learned_motion": 0.0,
+    },
     "alignment": {"stop_s": _NEVER},
 }
 ABLATIONS = (
@@ -47,6 +54,8 @@ ABLATIONS = (
     Variant("without the gate that inflates", {"filter": {"gate": _NEVER}}),
     Variant("without the lever arm's three states", {"filter": {"lever_sigma_m": 0.0}}),
     Variant("without noise that grows with the force", {"filter": {"accel_scale_sqrt_s": 0.0}}),
+    Variant("without noise that grows with the force's change", {"filter": {"accel_timing_s": 0.0}}),
+    Variant("stance without the sole's expected motion", {"filter": {"learned_motion": 0.0}}),
     Variant("without gyro bias from later stops", {"alignment": {"stop_s": _NEVER}}),
     Variant(
         "without any gyro bias", {"alignment": {"bias_sigma_rad_s": 1e-9, "bias_walk_rad_s_sqrt_s": 0.0}}
@@ -69,11 +78,12 @@ def plain(method: str) -> Variant:
 def rmse_of(variant: Variant, runs: Sequence[Run]) -> list[float]:
     """The 2-D RMSE of every foot whose run tells its way, in metres, after a rigid fit of yaw and offset."""
     settings = variant.settings()
-    errors = [_rmse(run, place, settings) for run in runs for place in FEET if place in run.imus]
+    errors = [foot_rmse(run, place, settings) for run in runs for place in FEET if place in run.imus]
     return [error for error in errors if error is not None]
 
 
-def _rmse(run: Run, place: str, settings: "FootSettings") -> float | None:
+def foot_rmse(run: Run, place: str, settings: "FootSettings") -> float | None:
+    """The 2-D RMSE of one foot, m, after a rigid fit; None if the run does not tell its way."""
     truth = run.truth_of(place)
     if truth is None:
         return None

@@ -1,4 +1,4 @@
-"""The learned detector on trials that it was not trained on: weights of one half of the set, scored on the other.
+"""The learned detector on feet that it was not trained on: weights of one half of each set, scored on the other.
 
     python -m proving_ground.evaluation.cross_fit DATA        (about two minutes)
 
@@ -19,20 +19,21 @@ from typing import Literal
 import numpy as np
 
 import pdr_engine
-from proving_ground.evaluation.ablation import ABLATIONS, rmse_of
-from proving_ground.evaluation.train_stance import SET, training_runs
+from proving_ground.evaluation.ablation import ABLATIONS, foot_rmse
+from proving_ground.evaluation.stance_examples import SETS, training_feet
 
 Half = Literal["even", "odd"]
 _OTHER: dict[Half, Half] = {"even": "odd", "odd": "even"}
 _FIRST: dict[Half, int] = {"even": 0, "odd": 1}
 
 
-def cross_fit(data: Path) -> list[float]:
-    """The 2-D RMSE, m, of every trial with weights trained on the half without it."""
-    return [error for half in _OTHER for error in _trained_on(half, data)]
+def cross_fit(data: Path) -> dict[str, list[float]]:
+    """By set, the 2-D RMSE, m, of every foot with weights trained on the half without it."""
+    halves = [_trained_on(half, data) for half in _OTHER]
+    return {name: [error for half in halves for error in half[name]] for name in halves[0]}
 
 
-def _trained_on(half: Half, data: Path) -> list[float]:
+def _trained_on(half: Half, data: Path) -> dict[str, list[float]]:
     with tempfile.TemporaryDirectory() as folder:
         package = Path(folder) / "pdr_engine"
         shutil.copytree(
@@ -41,7 +42,7 @@ def _trained_on(half: Half, data: Path) -> list[float]:
         weights = _python("train_stance", str(data), "--half", half)
         (package / "foot" / "weights.py").write_text(weights, encoding="utf-8")
         scored = _python("cross_fit", str(data), "--score", _OTHER[half], path=folder)
-    errors: list[float] = json.loads(scored)
+    errors: dict[str, list[float]] = json.loads(scored)
     return errors
 
 
@@ -50,6 +51,19 @@ def _python(module: str, *arguments: str, path: str | None = None) -> str:
     environment = os.environ | ({"PYTHONPATH": path} if path else {})
     command = [sys.executable, "-m", f"proving_ground.evaluation.{module}", *arguments]
     return subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def _scored(half: Half, data: Path) -> dict[str, list[float]]:
+    """By set, the errors of a half's feet with the weights at hand."""
+    settings = ABLATIONS[0].settings()
+    found = {}
+    for name in SETS:
+        errors = [
+            foot_rmse(run, place, settings) for run, place in training_feet(data, name)[_FIRST[half] :: 2]
+        ]
+        if known := [error for error in errors if error is not None]:
+            found[name] = known
+    return found
 
 
 def summary(errors: Sequence[float]) -> str:
@@ -64,10 +78,10 @@ def main(arguments: Sequence[str]) -> None:
     """The command: cross-fit a data folder, or score one half with the weights at hand."""
     data = Path(arguments[0])
     if arguments[1:2] == ["--score"]:
-        first = _FIRST["even" if arguments[2] == "even" else "odd"]
-        sys.stdout.write(json.dumps(rmse_of(ABLATIONS[0], training_runs(data)[first::2])))
+        sys.stdout.write(json.dumps(_scored("even" if arguments[2] == "even" else "odd", data)))
         return
-    sys.stdout.write(f"{SET}, weights of the other half: {summary(cross_fit(data))}\n")
+    for name, errors in cross_fit(data).items():
+        sys.stdout.write(f"{name}, weights of the other half: {summary(errors)}\n")
 
 
 if __name__ == "__main__":

@@ -161,7 +161,7 @@ def estimate_foot(imu: ImuSeries, method: str) -> Estimate:
             np.concatenate([output.time_ns for output in outputs]) / _NS_PER_S,
             np.concatenate([output.position_m for output in outputs]),
         ),
-        steps=_chain(steps),
+        steps=step_chain(steps),
         strides=count_strides(np.array([step.displacement_m for step in steps]).reshape(-1, 3)),
         samples=len(time_ns),
         seconds=seconds,
@@ -201,7 +201,8 @@ def estimate_fused(run: Run, method: str) -> Estimate:
     )
 
 
-def _chain(steps: Sequence["FootStepEstimate"]) -> StepChain | None:
+def step_chain(steps: Sequence["FootStepEstimate"]) -> StepChain | None:
+    """The steps as the consistency check reads them; None if there are none."""
     if not steps:
         return None
     horizontal = np.ix_([0, 1, 3], [0, 1, 3])

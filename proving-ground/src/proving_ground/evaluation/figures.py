@@ -18,7 +18,9 @@ from proving_ground.evaluation.foot_motion_page import motion_findings
 from proving_ground.evaluation.foot_page import Findings, page
 from proving_ground.evaluation.foot_plots import save_shares, save_tracks
 from proving_ground.evaluation.long_walks import SEEDS, compare_all
-from proving_ground.evaluation.train_stance import training_runs
+from proving_ground.evaluation.robustness import degradations
+from proving_ground.evaluation.stance_examples import SETS as TRAINED_ON
+from proving_ground.evaluation.stance_examples import training_feet
 from sensor_gateway.recordings import load_runs
 from sensor_gateway.recordings.run import Run
 
@@ -28,7 +30,7 @@ STAIRS = tuple(f"gaitmap-example/imu_sample_healthy_stair_{way}.csv" for way in 
 WALKED = SETS[:2]  # the sets with enough runs to compare methods and choices by
 DEFAULT = FootSettings().method
 _TURNS = 3
-_CROSS_FIT_RUNS = 4  # a half of fewer teaches nothing
+_CROSS_FIT_FEET = 4  # a half of fewer teaches nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,8 @@ def main(data: Path, docs: Path, seeds: Sequence[int] = SEEDS) -> None:
             [run for name in STAIRS for run in climbed(data / name)],
         ),
         cost=measure(walk_of(None), _TURNS),
-        cross_fit=cross_fit(data) if len(training_runs(data)) >= _CROSS_FIT_RUNS else None,
+        faults={one.name: list(degradations(one.runs)) for one in walked},
+        cross_fit=cross_fit(data) if len(training_feet(data, TRAINED_ON[0])) >= _CROSS_FIT_FEET else None,
         long_walks=compare_all(seeds) if seeds else {},
     )
     (docs / "foot-ins.md").write_text(page(findings), encoding="utf-8")

@@ -153,7 +153,7 @@ def compare_all(seeds: Sequence[int] = SEEDS) -> dict[str, list[Comparison]]:
     }
 
 
-def table(found: Mapping[str, Sequence[Comparison]]) -> list[str]:
+def long_walks_table(found: Mapping[str, Sequence[Comparison]]) -> list[str]:
     """Lines of a Markdown table: without → with."""
     lines = [
         "| walk | n | RMSE m, median | mean | worst | drift °/min, mean size | walks that got worse |",
@@ -170,4 +170,4 @@ def table(found: Mapping[str, Sequence[Comparison]]) -> list[str]:
 
 
 if __name__ == "__main__":
-    sys.stdout.write("\n".join(table(compare_all())) + "\n")
+    sys.stdout.write("\n".join(long_walks_table(compare_all())) + "\n")

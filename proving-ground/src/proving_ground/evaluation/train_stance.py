@@ -2,125 +2,87 @@
 
 python -m proving_ground.evaluation.train_stance DATA [--half even|odd] > weights.py  (of `pdr_engine.foot`)
 
-Training data: pyshoe-vicon (Wagstaff, Peretroukhin and Kelly, University of Toronto; MIT licence), whose truth
-gives the foot's velocity at every sample. The network learns ln σ, the scale of that velocity v, by maximum
-likelihood under Student's t in three dimensions, ν = 3: the loss of a sample is
+First the network learns ln σ, the scale of a foot's velocity v, from pyshoe-vicon by maximum likelihood under
+Student's t in three dimensions, ν = 3: a sample's loss is
 
     3 ln σ + (ν + 3)/2 · ln(1 + |v|²/(ν σ²)),
 
-whose heavy tails forgive the truth's glitches. The truth's own noise, 1 cm/s, is added to |v|², and long standing
-weighs less than motion. Features and size were chosen by training on the trials of even number and looking at those
+whose heavy tails forgive the truth's glitches. Then, with that σ as it is, two more outputs of the same hidden
+units learn the mean of the sole's v/σ along the step's way and up (`fit_motion`), from all sets whose truth follows
+the foot (`stance_examples.SETS`). The truth's own noise, 1 cm/s, is added to |v|², and long standing weighs less
+than motion. Features and size were chosen by training on the feet of even number in each set and looking at those
 of odd number, and the other way round (``--half``).
 """
 
 import argparse
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
-from scipy.signal import savgol_filter
 
-from pdr_engine.foot import FootNavigator, FootSettings
-from pdr_engine.foot.learned import tabulate
-from pdr_engine.foot.memory import FEATURES, HIDDEN, SAMPLE, fresh_state, parameters
-from sensor_gateway.recordings import load_runs
-from sensor_gateway.recordings.run import ImuSeries, Run
+from pdr_engine.foot.memory import FEATURES, HIDDEN
+from proving_ground.evaluation.stance_examples import (
+    SETS,
+    Examples,
+    examples_of,
+    speed_examples_of,
+    training_feet,
+)
 
 FloatArray = npt.NDArray[np.float64]
-SET = "pyshoe-vicon"
 NU = 3.0
 TRUTH_NOISE_M_S = 0.01
-AHEAD_S = 0.041  # what the features look ahead, and a little
-STRIDE_RATE_FEATURE, STANDING_BELOW, STANDING_WEIGHT = 11, -6.0, 0.15
-EVERY = 3  # neighbours tell the same
-DECAY = 1e-4
+DECAY, MOTION_DECAY = 1e-4, 1e-3
 ITERATIONS = 400
-VELOCITY_SAMPLES = 11  # of the truth's smoothed derivative: 55 ms
-
-
-@dataclass(frozen=True, slots=True)
-class Examples:
-    """``features`` (n, FEATURES), ``speed_m_s`` (n,) of the foot by the truth, ``weight`` (n,)."""
-
-    features: FloatArray
-    speed_m_s: FloatArray
-    weight: FloatArray
-
-    @staticmethod
-    def joined(parts: Sequence["Examples"]) -> "Examples":
-        """All in one table."""
-        return Examples(
-            np.vstack([part.features for part in parts]),
-            np.concatenate([part.speed_m_s for part in parts]),
-            np.concatenate([part.weight for part in parts]),
-        )
 
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """ln σ = bias + Σ output_k · u/(1 + |u|), u = hidden_bias_k + inputs_k · x."""
+    """ln σ = bias + output·h, mean/σ = motion_bias + motion·h with h = u/(1 + |u|), u = hidden_bias + inputs·x.
+
+    ``inputs`` (HIDDEN, FEATURES), ``hidden_bias`` and ``output`` (HIDDEN,), ``motion`` (2, HIDDEN): along and up.
+    """
 
     inputs: FloatArray
     hidden_bias: FloatArray
     output: FloatArray
     bias: float
+    motion: FloatArray
+    motion_bias: FloatArray
 
     @staticmethod
     def unpacked(vector: FloatArray) -> "Network":
-        """From the vector that is optimised."""
+        """From the vector that is optimised first, without motion."""
         inputs, hidden, output = np.split(vector[:-1], [HIDDEN * FEATURES, HIDDEN * (FEATURES + 1)])
-        return Network(inputs.reshape(HIDDEN, FEATURES), hidden, output, float(vector[-1]))
+        none = np.zeros((2, HIDDEN)), np.zeros(2)
+        return Network(inputs.reshape(HIDDEN, FEATURES), hidden, output, float(vector[-1]), *none)
 
     def behind(self, mean: FloatArray, scale: FloatArray) -> "Network":
         """The network of raw features that equals this one of features less ``mean``, over ``scale``."""
         inputs = self.inputs / scale
-        return Network(inputs, self.hidden_bias - inputs @ mean, self.output, self.bias)
+        return replace(self, inputs=inputs, hidden_bias=self.hidden_bias - inputs @ mean)
 
+    def hidden(self, features: FloatArray) -> FloatArray:
+        """h, (n, HIDDEN)."""
+        u = features @ self.inputs.T + self.hidden_bias
+        return np.asarray(u / (1.0 + np.abs(u)))
 
-def training_runs(data: Path) -> list[Run]:
-    """The runs of the training set that know every foot's own way; none if the set is not there."""
-    runs = load_runs([data / SET]) if (data / SET).is_dir() else []
-    return [run for run in runs if set(run.imus) <= set(run.truth)]
-
-
-def examples_of(run: Run, place: str) -> Examples:
-    """Features of every third sample of a foot, and its true speed there."""
-    imu, truth = run.imus[place], run.truth[place]
-    position = np.column_stack([np.interp(imu.time_s, truth.time_s, axis) for axis in truth.position_m.T])
-    interval_s = float(np.median(np.diff(imu.time_s)))
-    velocity = savgol_filter(position, VELOCITY_SAMPLES, 2, deriv=1, delta=interval_s, axis=0)
-    features = features_of(imu)
-    weight = np.where(features[:, STRIDE_RATE_FEATURE] < STANDING_BELOW, STANDING_WEIGHT, 1.0)
-    speed = np.linalg.norm(velocity, axis=1)
-    return Examples(features[::EVERY], speed[::EVERY], weight[::EVERY])
-
-
-def features_of(imu: ImuSeries) -> FloatArray:
-    """What the kernel sees at every sample, (n, FEATURES), with the gyro bias that the run ends with."""
-    settings = FootSettings(method="adaptive")
-    batch = np.zeros(len(imu.time_s), SAMPLE)
-    batch["time_ns"] = np.round((imu.time_s - imu.time_s[0]) * 1e9)
-    batch["accel"], batch["gyro"] = imu.accel_m_s2, imu.gyro_rad_s
-    navigator = FootNavigator(settings)
-    navigator.process(batch["time_ns"], imu.accel_m_s2, imu.gyro_rad_s)
-    navigator.finish()
-    rows = np.zeros((len(batch), FEATURES))
-    ahead = int(np.ceil(AHEAD_S / np.median(np.diff(imu.time_s))))
-    tabulate(fresh_state(settings), parameters(settings), batch, navigator.gyro_bias_rad_s, ahead, rows)
-    return rows
+    def sigma(self, features: FloatArray) -> FloatArray:
+        """σ, m/s, (n,)."""
+        return np.asarray(np.exp(self.hidden(features) @ self.output + self.bias))
 
 
 def loss(vector: FloatArray, examples: Examples) -> tuple[float, FloatArray]:
-    """Mean loss of the examples, with weight decay, and its gradient."""
+    """Mean loss of the examples by σ, with weight decay, and its gradient."""
     net, x = Network.unpacked(vector), examples.features
     u = x @ net.inputs.T + net.hidden_bias
     slope = 1.0 / (1.0 + np.abs(u))
     log_sigma = (u * slope) @ net.output + net.bias
-    ratio = (examples.speed_m_s**2 + TRUTH_NOISE_M_S**2) * np.exp(-2.0 * log_sigma) / NU
+    square = (examples.velocity_m_s**2).sum(axis=1) + TRUTH_NOISE_M_S**2
+    ratio = square * np.exp(-2.0 * log_sigma) / NU
     share = examples.weight / examples.weight.sum()
     value = share @ (3.0 * log_sigma + (NU + 3.0) / 2.0 * np.log1p(ratio))
     pull = share * (3.0 - (NU + 3.0) * ratio / (1.0 + ratio))
@@ -132,10 +94,30 @@ def loss(vector: FloatArray, examples: Examples) -> tuple[float, FloatArray]:
     return float(value) + decay, gradient
 
 
+def motion_loss(vector: FloatArray, net: Network, examples: Examples) -> tuple[float, FloatArray]:
+    """Mean loss of the examples by the mean motion (``vector``: rows of motion and its bias), and its gradient."""
+    rows, h, sigma = (
+        vector.reshape(2, HIDDEN + 1),
+        net.hidden(examples.features),
+        net.sigma(examples.features),
+    )
+    mean = h @ rows[:, :HIDDEN].T + rows[:, HIDDEN]
+    mean[:, 0] *= examples.way
+    left = examples.velocity_m_s / sigma[:, None]
+    left[:, [0, 2]] -= mean
+    ratio = ((left**2).sum(axis=1) + (TRUTH_NOISE_M_S / sigma) ** 2) / NU
+    share = examples.weight / examples.weight.sum()
+    pull = -share * (NU + 3.0) / NU / (1.0 + ratio)
+    by_mean = np.column_stack([pull * left[:, 0] * examples.way, pull * left[:, 2]])
+    by_motion = by_mean.T @ h + 2.0 * MOTION_DECAY * rows[:, :HIDDEN]
+    value = share @ ((NU + 3.0) / 2.0 * np.log1p(ratio)) + MOTION_DECAY * (rows[:, :HIDDEN] ** 2).sum()
+    return float(value), np.column_stack([by_motion, by_mean.sum(axis=0)]).ravel()
+
+
 def train(examples: Examples) -> Network:
-    """The network that explains the examples; the same for the same examples."""
+    """The network whose σ explains the examples, without motion; the same for the same examples."""
     mean, scale = examples.features.mean(axis=0), examples.features.std(axis=0)
-    normal = Examples((examples.features - mean) / scale, examples.speed_m_s, examples.weight)
+    normal = replace(examples, features=(examples.features - mean) / scale)
     rng = np.random.default_rng(0)
     start = np.concatenate(
         [
@@ -150,22 +132,33 @@ def train(examples: Examples) -> Network:
     return Network.unpacked(np.asarray(found.x)).behind(mean, scale)
 
 
+def fit_motion(net: Network, examples: Examples) -> Network:
+    """The network with the mean motion that explains the examples best; its σ stays."""
+    start = np.zeros(2 * (HIDDEN + 1))
+    found = minimize(motion_loss, start, args=(net, examples), jac=True, method="L-BFGS-B")
+    rows = np.asarray(found.x).reshape(2, HIDDEN + 1)
+    return replace(net, motion=rows[:, :HIDDEN], motion_bias=rows[:, HIDDEN])
+
+
 def source_of(net: Network) -> str:
     """The weights as a module."""
     lines = [
         '"""Weights of the learned stance detector. Made by `python -m proving_ground.evaluation.train_stance`.',
         "",
-        f"Trained on {SET} (Wagstaff, Peretroukhin and Kelly, University of Toronto; MIT licence).",
+        "Trained on pyshoe-vicon (Wagstaff, Peretroukhin and Kelly, University of Toronto), gaitmap-example",
+        "(MaD Lab, FAU) and dualfoot-fgo (Hu and Hu), all under the MIT licence.",
         '"""',
         "",
         "import numpy as np",
         "",
         f"BIAS = {net.bias:.6g}",
+        f"MOTION_BIAS = np.array({_row(net.motion_bias)})",
     ]
     for name, values in (("HIDDEN_BIAS", net.hidden_bias), ("OUTPUT", net.output)):
         lines += [f"{name} = np.array(", f"    {_row(values)}", ")"]
-    rows = [f"        {_row(row)}," for row in net.inputs]
-    return "\n".join([*lines, "INPUT = np.array(", "    [", *rows, "    ]", ")", ""])
+    for name, table in (("MOTION", net.motion), ("INPUT", net.inputs)):
+        lines += [f"{name} = np.array(", "    [", *(f"        {_row(row)}," for row in table), "    ]", ")"]
+    return "\n".join([*lines, ""])
 
 
 def _row(values: FloatArray) -> str:
@@ -173,11 +166,13 @@ def _row(values: FloatArray) -> str:
 
 
 def main(data: Path, half: str | None) -> None:
-    """Train on the set's runs (of even or odd number, if asked) and write the module to standard output."""
-    runs = training_runs(data)
+    """Train on the sets' feet (of even or odd number, if asked) and write the module to standard output."""
     first, step = {"even": (0, 2), "odd": (1, 2), None: (0, 1)}[half]
-    parts = [examples_of(run, place) for run in runs[first::step] for place in run.imus]
-    sys.stdout.write(source_of(train(Examples.joined(parts))))
+    feet = {name: training_feet(data, name)[first::step] for name in SETS}
+    speeds = [speed_examples_of(run, place) for run, place in feet[SETS[0]]]
+    motions = [examples_of(run, place) for name in SETS for run, place in feet[name]]
+    net = fit_motion(train(Examples.joined(speeds)), Examples.joined(motions))
+    sys.stdout.write(source_of(net))
 
 
 if __name__ == "__main__":

@@ -65,6 +65,11 @@ class Boot:
             self._navigator.know_earth_field(field)
             self._declination_rad = field.declination_rad
 
+    @property
+    def contradicts_itself(self) -> bool:
+        """Whether accelerometer and gyro do not fit together: wrong units, or axes that are not right-handed."""
+        return self._navigator.contradicts_itself
+
     def _measure_rate(self, newest_ns: int, count: int) -> None:
         self.newest_ns = newest_ns
         span_ns = newest_ns - self._rate_since_ns

@@ -47,15 +47,17 @@ class EngineCore:
         return [envelope for boot in self._boots.values() for envelope in boot.close()]
 
     def figures(self) -> Figures:
-        """Counts and rates per place; degraded when a boot that was heard has gone silent."""
+        """Counts and rates per place; degraded when a boot is silent, or its sensors contradict each other."""
         counters = dict(self._counters)
         gauges = {}
         for place, boot in self._boots.items():
             counters |= {f"{place}_{name}": value for name, value in boot.counters().items()}
             gauges[f"{place}_rate_hz"] = boot.rate_hz
         silent = [place for place, boot in self._boots.items() if self._is_silent(boot)]
-        note = f"silent: {', '.join(silent)}" if silent else ""
-        return Figures(state="degraded" if silent else "ok", counters=counters, gauges=gauges, note=note)
+        wrong = [place for place, boot in self._boots.items() if boot.contradicts_itself]
+        notes = [f"silent: {', '.join(silent)}"] if silent else []
+        notes += [f"axes or units contradict each other: {', '.join(wrong)}"] if wrong else []
+        return Figures("degraded" if notes else "ok", counters=counters, gauges=gauges, note="; ".join(notes))
 
     def _is_silent(self, boot: Boot) -> bool:
         if self._now_ns is None or boot.newest_ns is None:

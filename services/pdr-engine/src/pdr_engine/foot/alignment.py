@@ -7,7 +7,6 @@ first zero-velocity update finds it out.
 """
 
 import math
-from typing import Any
 
 from pdr_engine.foot.compiled import Record, compiled
 from pdr_engine.foot.memory import (
@@ -23,11 +22,24 @@ from pdr_engine.foot.memory import (
     VELOCITY,
 )
 from pdr_engine.foot.quaternion import assign, from_rotation_vector, multiply, normalised, rotate, twist
+from pdr_engine.foot.rest import (
+    EXPECTED_NS,
+    blend_bias,
+    distrust_bias,
+    explained,
+    listen,
+    mean,
+    quiet,
+    remember_bias,
+    steady,
+    steady_ns,
+    unrest,
+    verified_still,
+    weigh_gravity,
+)
 from pdr_engine.foot.stance import angular_energy, force_energy, window_start
 
 QUIET_WINDOW_NS = 100_000_000
-UNREST_BLOCK_NS = 50_000_000
-ROCKING_S = 0.25
 REST_SPEED_M_S = 0.01
 WALKING_SPEED_M_S = 1.5  # sigma of where a person goes unseen
 SWING_SPEED_M_S = 3.0  # sigma of a foot's velocity in mid-walk
@@ -36,91 +48,9 @@ RING_LIMIT = RING - 256
 
 
 @compiled
-def _mean(ring: Any, first: int, last: int, axis: int) -> float:
-    total = 0.0
-    for k in range(first, last + 1):
-        total += ring[k & MASK, axis]
-    return total / (last - first + 1)
-
-
-@compiled
-def _deviation(ring: Any, first: int, last: int) -> float:
-    """Standard deviation over the window, of the axis that moves most."""
-    worst = 0.0
-    for axis in range(3):
-        mean = _mean(ring, first, last, axis)
-        total = 0.0
-        for k in range(first, last + 1):
-            total += (ring[k & MASK, axis] - mean) ** 2
-        worst = max(worst, total / (last - first + 1))
-    return math.sqrt(worst)
-
-
-@compiled
-def _mean_length(ring: Any, first: int, last: int) -> float:
-    total = 0.0
-    for axis in range(3):
-        total += _mean(ring, first, last, axis) ** 2
-    return math.sqrt(total)
-
-
-@compiled
-def verified_still(s: Record, p: Record, first: int, last: int) -> bool:
-    """Whether the window shows a sensor at rest: quiet, no turn, and gravity alone."""
-    still: bool = (
-        _deviation(s.gyro, first, last) < p.still_gyro_std
-        and _deviation(s.accel, first, last) < p.still_accel_std
-        and _mean_length(s.gyro, first, last) < p.still_rate
-        and abs(_mean_length(s.accel, first, last) - 9.81) < p.still_gravity
-    )
-    return still
-
-
-@compiled
-def unrest(s: Record, first: int, last: int) -> float:
-    """How much the angular rate wanders within the window, rad/s: its worst axis's deviation, in means of 50 ms.
-
-    The means take the sensor's own noise away and leave the rocking of a foot that is not quite at rest.
-    """
-    worst = 0.0
-    for axis in range(3):
-        blocks, total, squares = 0, 0.0, 0.0
-        begin = first
-        for k in range(first, last + 1):
-            if s.time_ns[k & MASK] - s.time_ns[begin & MASK] >= UNREST_BLOCK_NS:
-                mean = _mean(s.gyro, begin, k - 1, axis)
-                blocks, total, squares = blocks + 1, total + mean, squares + mean * mean
-                begin = k
-        if blocks > 1:
-            worst = max(worst, (squares - total * total / blocks) / (blocks - 1))
-    return math.sqrt(worst)
-
-
-@compiled
-def blend_bias(s: Record, p: Record, rate: Any, span_s: float, wander: float) -> None:
-    """Gyro bias from the mean ``rate`` over ``span_s`` at rest, weighed against what was known before the stop.
-
-    A standing foot rocks by ``sway`` at least, and by its rate's ``wander`` for a quarter of a second: a mean
-    over T is the bias to within that angle over T.
-    """
-    variance = (max(p.sway, wander * ROCKING_S) / span_s) ** 2
-    weight = s.stop_variance / (s.stop_variance + variance)
-    for axis in range(3):
-        s.bias[axis] = s.stop_bias[axis] + weight * (rate[axis] - s.stop_bias[axis])
-    s.bias_variance = s.stop_variance * (1.0 - weight)
-
-
-@compiled
-def remember_bias(s: Record) -> None:
-    """A stop begins: what is known of the bias before it."""
-    assign(s.stop_bias, s.bias)
-    s.stop_variance = s.bias_variance
-
-
-@compiled
 def _level(s: Record, first: int, last: int) -> None:
     """Attitude whose mean specific force points up and whose sensor x axis lies along nav x (y, if x is steep)."""
-    x, y, z = _mean(s.accel, first, last, 0), _mean(s.accel, first, last, 1), _mean(s.accel, first, last, 2)
+    x, y, z = mean(s.accel, first, last, 0), mean(s.accel, first, last, 1), mean(s.accel, first, last, 2)
     length = math.sqrt(x * x + y * y + z * z)
     x, y, z = x / length, y / length, z / length
     if z >= 0.0:  # the shortest turn of (x, y, z) onto (0, 0, 1)
@@ -190,10 +120,13 @@ def _align(s: Record, p: Record, first: int, last: int, verified: bool) -> None:
     if verified:
         span_s = (s.time_ns[last & MASK] - s.time_ns[first & MASK]) * NS
         for axis in range(3):
-            s.rate[axis] = _mean(s.gyro, first, last, axis)
+            s.rate[axis] = mean(s.gyro, first, last, axis)
         remember_bias(s)
+        if not explained(s, p, first, last):
+            distrust_bias(s)
         blend_bias(s, p, s.rate, span_s, unrest(s, first, last))
-        s.gravity = _mean_length(s.accel, first, last)
+        weigh_gravity(s, first, last)
+        listen(s, p, first, last)
     _level(s, first, last)
     if s.aligned == 0:
         assign(s.reference, s.attitude)
@@ -216,7 +149,12 @@ def try_align(s: Record, p: Record, now: bool) -> None:
         _align(s, p, first, last, True)
         return
     waited_ns = s.time_ns[last & MASK] - s.time_ns[s.start & MASK]
+    if 2 * waited_ns >= EXPECTED_NS and quiet(s, p, s.start, last) and steady(s, s.start, last):
+        if waited_ns >= steady_ns(s, p, s.start, last):
+            _align(s, p, s.start, last, True)
+            return
+        waited_ns = 0
     if now or waited_ns >= p.patience_ns or s.head - s.start >= RING_LIMIT:
-        quiet = _quietest(s, p)
-        if quiet >= 0:
-            _align(s, p, window_start(s, quiet, QUIET_WINDOW_NS), quiet, False)
+        calmest = _quietest(s, p)
+        if calmest >= 0:
+            _align(s, p, window_start(s, calmest, QUIET_WINDOW_NS), calmest, False)

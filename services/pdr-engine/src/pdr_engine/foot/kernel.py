@@ -10,10 +10,16 @@ that inflates. The same equations stand as matrices in tests/support/foot_oracle
 import math
 
 from pdr_engine.foot.compiled import Record, compiled
+from pdr_engine.foot.gap import doubt_gap
 from pdr_engine.foot.memory import ATTITUDE, HEADING, LEVER, MASK, POSITION, STATES, VELOCITY
 from pdr_engine.foot.quaternion import assign, from_rotation_vector, multiply, normalised, rotate
 
 UPDATE_INTERVAL_S = 0.005  # the zero-velocity sigma is that of one update at this interval
+# Errors of interpolated samples, as parts of the force (less gravity) and of the rate.
+FILLED_FORCE, FILLED_RATE = 0.3, 0.05
+REBUILT = 0.1  # sigma of what a rebuilt peak adds, as a part of it
+PEAK_S = 0.1  # for so long it errs alike
+WAY_M = 0.3  # a step much shorter than this has no direction, and a foot that rests has no way at all
 BIAS_MEMORY_S = 1.0  # the bias's uncertainty adds up coherently over about a step
 
 
@@ -68,25 +74,38 @@ def propagate(s: Record, p: Record, at: int, dt: float, gap: bool) -> None:
         _transport(P, s, dt, i, True)
     for i in range(STATES):
         _transport(P, s, dt, i, False)
-    velocity = (p.accel_noise**2 + (p.accel_scale * _shaking(s)) ** 2) * dt
-    angle = (p.gyro_noise**2 + (p.gyro_scale * _turning(s, at)) ** 2 + s.bias_variance * BIAS_MEMORY_S) * dt
+    velocity = (s.accel_noise**2 + (p.accel_scale * _shaking(s)) ** 2) * dt + _shock_variance(s, p, at)
+    angle = (s.gyro_noise**2 + (p.gyro_scale * _turning(s, at)) ** 2 + s.bias_variance * BIAS_MEMORY_S) * dt
     if gap:
-        velocity += (p.gap_accel * dt) ** 2
-        angle += (p.gap_rate * dt) ** 2
+        doubt_gap(s, p, dt)
+    if s.filled[at & MASK]:
+        velocity += (FILLED_FORCE * _shaking(s) * dt) ** 2
+        angle += (FILLED_RATE * _turning(s, at) * dt) ** 2
     for axis in range(3):
-        if gap:
-            P[POSITION + axis, POSITION + axis] += (0.5 * p.gap_accel * dt**2) ** 2
         P[VELOCITY + axis, VELOCITY + axis] += velocity
         P[ATTITUDE + axis, ATTITUDE + axis] += angle
         P[LEVER + axis, LEVER + axis] += p.lever_walk**2 * dt
         if s.clipped[at & MASK, axis]:
-            _doubt_axis(s, axis, p.clip_noise**2 * dt)
+            rebuilt = REBUILT * s.rebuilt[at & MASK, axis]
+            _doubt_axis(s, ATTITUDE, axis, (p.clip_noise**2 + rebuilt**2 * PEAK_S) * dt)
+        if s.cut_force[at & MASK, axis]:
+            _doubt_axis(s, VELOCITY, axis, (p.cut_force * dt) ** 2)
 
 
 @compiled
 def _shaking(s: Record) -> float:
     """Size of the specific force without gravity, m/s²."""
     return math.sqrt(s.force[0] ** 2 + s.force[1] ** 2 + (s.force[2] - s.gravity) ** 2)
+
+
+@compiled
+def _shock_variance(s: Record, p: Record, at: int) -> float:
+    """Variance of the velocity, (m/s)², if the force's change since the last sample is off by ``accel_timing``."""
+    square = 0.0
+    for axis in range(3):
+        square += (s.accel[at & MASK, axis] - s.accel[(at - 1) & MASK, axis]) ** 2
+    variance: float = p.accel_timing**2 * square
+    return variance
 
 
 @compiled
@@ -99,12 +118,12 @@ def _turning(s: Record, at: int) -> float:
 
 
 @compiled
-def _doubt_axis(s: Record, axis: int, variance: float) -> None:
-    """Add attitude noise about one sensor axis."""
+def _doubt_axis(s: Record, block: int, axis: int, variance: float) -> None:
+    """Add noise to a block of the state (attitude, velocity) along one sensor axis."""
     u = rotate(s.attitude, 1.0 * (axis == 0), 1.0 * (axis == 1), 1.0 * (axis == 2))
     for i in range(3):
         for j in range(3):
-            s.P[ATTITUDE + i, ATTITUDE + j] += u[i] * u[j] * variance
+            s.P[block + i, block + j] += u[i] * u[j] * variance
 
 
 @compiled
@@ -128,6 +147,15 @@ def _measurement(s: Record, at: int) -> tuple[float, float, float]:
     H[0, ATTITUDE + 1], H[0, ATTITUDE + 2], H[1, ATTITUDE + 2] = u[2], -u[1], u[0]
     H[1, ATTITUDE], H[2, ATTITUDE], H[2, ATTITUDE + 1] = -u[2], u[1], -u[0]
     return (-s.velocity[0] - u[0], -s.velocity[1] - u[1], -s.velocity[2] - u[2])
+
+
+@compiled
+def _expected_motion(s: Record, p: Record, at: int) -> tuple[float, float, float]:
+    """Mean velocity of the sole, nav axes: along the way from the last step's end, and up; none without a way."""
+    x, y = s.position[0] - s.step_position[0], s.position[1] - s.step_position[1]
+    scale = p.learned_motion / math.sqrt(x * x + y * y + WAY_M**2)
+    along, up = scale * s.motion[at & MASK, 0], scale * s.motion[at & MASK, 1]
+    return along * x, along * y, up * math.sqrt(x * x + y * y)
 
 
 @compiled
@@ -180,12 +208,13 @@ def creep(s: Record, p: Record, at: int, dt: float) -> None:
 
 @compiled
 def zero_velocity(s: Record, p: Record, at: int, dt: float) -> None:
-    """The sole stands still: update with its velocity 0.
+    """The sole stands: update with its velocity, 0 or what the learned detector expects.
 
     An innovation beyond ``gate`` sigmas inflates the measurement's noise (Huber's weight): S → (√NIS/gate)·S.
     The covariance stays symmetric by construction: P −= (P·Hᵀ)·S⁻¹·(P·Hᵀ)ᵀ, computed for one triangle.
     """
-    y = _measurement(s, at)
+    still, mean = _measurement(s, at), _expected_motion(s, p, at)
+    y = (still[0] + mean[0], still[1] + mean[1], still[2] + mean[2])
     _innovation_inverse(s, _stance_variance(s, p, at) * UPDATE_INTERVAL_S / dt)
     P, C, K, S = s.P, s.cross, s.gain, s.S
     nis = 0.0

@@ -1,4 +1,4 @@
-"""What the compiled kernel remembers: one structured record for its state, one for its parameters.
+"""What the compiled kernel remembers and takes in and gives out: structured records.
 
 A navigator *is* its state record: copying the record copies the navigator. Samples wait in rings until those
 behind them are known (a clipped peak's other flank, the rest of a detector's window); counts ``head``,
@@ -11,18 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from bootprint.messages import Direction, MotionClass
-from pdr_engine.foot.settings import METHODS, UNCALIBRATED, FootSettings, MagnetometerCalibration
+from pdr_engine.foot.settings import FootSettings
 
 RING = 2048
 MASK = RING - 1
 STATES = 12
 FEATURES, HIDDEN = 20, 10  # of the learned detector
-POSITION, VELOCITY, ATTITUDE, LEVER = (
-    0,
-    3,
-    6,
-    9,
-)  # first index of each block: m, m/s, rad (all nav), m (sensor)
+POSITION, VELOCITY, ATTITUDE, LEVER = 0, 3, 6, 9  # first index of each block: m, m/s, rad (nav), m (sensor)
 HEADING = ATTITUDE + 2  # rotation error about the vertical
 ALIGNING, RUNNING = 0, 1
 CLIP_LAG_NS = 35_000_000  # look-ahead of the cleaning stage
@@ -54,11 +49,20 @@ STATE = np.dtype(
         ("accel", "f8", (RING, 3)),
         ("gyro", "f8", (RING, 3)),
         ("mag", "f8", (RING, 3)),  # µT, NaN where unknown
-        ("clipped", "u1", (RING, 3)),
+        ("clipped", "u1", (RING, 3)),  # the gyro's axis is at its limit
+        ("rebuilt", "f8", (RING, 3)),  # by how much, rad/s
+        ("cut_force", "u1", (RING, 3)),  # so is the accelerometer's
+        ("filled", "u1", RING),  # never came: interpolated
         ("still", "u1", RING),
         ("sums", "f8", (RING, 8)),  # running sums for the learned detector
-        ("sigma", "f8", RING),  # scale of the foot's velocity, m/s, if learned
+        ("sigma", "f8", RING),  # scale of the sole's velocity, m/s, if learned
+        ("motion", "f8", (RING, 2)),  # its mean, m/s, along the step's way and up, if learned
         ("doubt", "f8", RING),  # detector's statistic over its threshold: below 1 is stance
+        ("usual_ns", "f8"),  # the interval between samples: its median
+        ("cut_level", "f8", 3),  # of the gyro's open plateaus; 0 if there is none
+        ("cut_first", "i8", 3),  # their first samples
+        ("force_top", "f8", (3, 2)),  # the largest force so far along each axis, and against it
+        ("force_hits", "i8", (3, 2)),  # samples that came as high
         # detector
         ("last_still_ns", "i8"),  # end of the newest window that was stance
         ("calm_since_ns", "i8"),
@@ -74,8 +78,15 @@ STATE = np.dtype(
         ("reference", "f8", 4),  # attitude that has yaw 0: the first alignment's
         ("yaw", "f8"),
         ("gravity", "f8"),
+        ("gravity_s", "f8"),  # seconds at rest that it is the mean of
+        ("accel_noise", "f8"),  # as set, or as heard at rest
+        ("gyro_noise", "f8"),
+        ("accel_white", "f8"),  # squares of the sensor's own densities, as heard
+        ("gyro_white", "f8"),
+        ("listened_s", "f8"),
         ("bias", "f8", 3),
         ("bias_variance", "f8"),
+        ("nis", "f8"),  # of the newest update: innovation squared, in units of its covariance
         ("cross", "f8", (STATES, 3)),  # P Hᵀ
         ("gain", "f8", (STATES, 3)),
         ("H", "f8", (3, STATES)),
@@ -86,6 +97,7 @@ STATE = np.dtype(
         ("stop_samples", "i8"),
         ("stop_since_ns", "i8"),
         ("stop_block", "i8"),  # first sample of the running block
+        ("stop_kind", "i8"),  # of rest
         ("stop_sum", "f8", 3),
         ("stop_unrest", "f8"),
         ("stop_bias", "f8", 3),  # as it was when the stop began
@@ -110,8 +122,7 @@ STATE = np.dtype(
         ("rest_since_ns", "i8"),  # the stance that is or was last
         ("rest_until_ns", "i8"),
         ("up", "f8", 3),  # sum of the vertical in sensor axes over that stance
-        ("nis", "f8"),  # of the newest update, and the worst of the step in that stance
-        ("worst_nis", "f8"),
+        ("worst_nis", "f8"),  # of the step, in that stance
         ("rest_up", "f8", 3),  # the vertical in sensor axes when the foot was lifted
         ("steep_up", "f8", 3),  # ... and when it was tilted most against that
         ("steep_cosine", "f8"),
@@ -156,8 +167,11 @@ STATE = np.dtype(
         ("dropped", "i8"),
         ("dropped_in_a_row", "i8"),
         ("gaps", "i8"),
+        ("missing", "i8"),
         ("clippings", "i8"),
+        ("force_clippings", "i8"),
         ("stances", "i8"),
+        ("contradictions", "i8"),
         ("realignments", "i8"),
     ],
     align=True,
@@ -166,7 +180,14 @@ STATE = np.dtype(
 SAMPLE = np.dtype([("time_ns", "i8"), ("accel", "f8", 3), ("gyro", "f8", 3), ("mag", "f8", 3)], align=True)
 
 ESTIMATE = np.dtype(
-    [("time_ns", "i8"), ("position_m", "f8", 3), ("speed_m_s", "f8"), ("yaw_rad", "f8"), ("stance", "?")],
+    [
+        ("time_ns", "i8"),
+        ("position_m", "f8", 3),
+        ("speed_m_s", "f8"),
+        ("attitude", "f8", 4),
+        ("yaw_rad", "f8"),
+        ("stance", "?"),
+    ],
     align=True,
 )
 
@@ -189,10 +210,8 @@ STEP = np.dtype(
         ("peak_rate_rad_s", "f8"),
         ("peak_force_m_s2", "f8"),
         ("quality_pct", "f8"),
-        (
-            "common_scale",
-            "f8",
-        ),  # 1 sigma of what all steps share: of the length, of the ground's slope, a turn
+        # 1 sigma of what all steps share: of the length, of the ground's slope, a turn
+        ("common_scale", "f8"),
         ("common_slope", "f8"),
         ("common_turn_rad_s", "f8"),
         ("motion", "i8"),  # place in MOTIONS
@@ -203,141 +222,17 @@ STEP = np.dtype(
     align=True,
 )
 
-_FLOATS = (
-    # filter
-    *("accel_noise", "gyro_noise", "accel_scale", "gyro_scale", "velocity_sigma", "gate"),
-    *("lever_sigma", "lever_walk", "clip_rate", "clip_noise", "gap_accel", "gap_rate", "max_speed"),
-    *("learned_noise", "hidden_motion", "step_scale"),
-    # detector
-    *("accel_weight", "gyro_weight", "threshold", "growth_rate", "growth_hold"),
-    # alignment
-    *("still_accel_std", "still_gyro_std", "still_rate", "still_gravity", "tilt_sigma", "quiet_tilt_sigma"),
-    *("sway", "bias_walk"),
-    # magnetometer
-    *("mag_floor", "mag_prior", "mag_disturbed", "mag_correlation", "mag_steadiness", "mag_iron", "mag_gate"),
-    *("mag_drift_sigma", "earth_horizontal", "earth_vertical"),
-)
-_INTEGERS = (
-    "method",
-    "window_ns",
-    "calm_hold_ns",
-    "still_window_ns",
-    "patience_ns",
-    "stop_ns",
-    "report_ns",
-    "mag_use",
-)
-_TABLES = (("mag_offset", "f8", 3), ("mag_matrix", "f8", (3, 3)))
-PARAMETERS = np.dtype(
-    [*((name, "f8") for name in _FLOATS), *((name, "i8") for name in _INTEGERS), *_TABLES], align=True
-)
-
 MOTIONS: tuple[MotionClass, ...] = ("standing", "walking", "running", "stairs", "crawling", "unknown")
 STANDING, WALKING, RUNNING_GAIT, STAIRS, CRAWLING, UNKNOWN = range(6)
 DIRECTIONS: tuple[Direction | None, ...] = (None, "forward", "left", "backward", "right")
-LEARNED, ADAPTIVE, SHOE, GYRO, DIFFERENTIAL, ARED = range(6)
-
-
-def _ns(seconds: float) -> int:
-    return round(seconds * 1e9)
-
-
-def _detector_values(settings: FootSettings) -> dict[str, float]:
-    d = settings.detector
-    thresholds = {
-        "learned": d.learned_sigma_m_s,
-        "adaptive": d.adaptive_threshold,
-        "shoe": d.shoe_threshold,
-        "gyro": d.gyro_rms_rad_s**2,
-        "differential": d.differential_sum_m_s2,
-        "ared": d.ared_threshold,
-    }
-    windows = {"gyro": d.gyro_window_s, "differential": d.differential_window_s}
-    return {
-        "method": METHODS.index(settings.method),
-        "accel_weight": d.shoe_accel_sigma_m_s2**-2,
-        "gyro_weight": d.shoe_gyro_sigma_rad_s**-2,
-        "threshold": thresholds[settings.method],
-        "growth_rate": d.adaptive_rate_per_s,
-        "growth_hold": d.adaptive_hold_s,
-        "window_ns": _ns(windows.get(settings.method, d.shoe_window_s)),
-        "calm_hold_ns": _ns(d.differential_hold_s),
-    }
-
-
-def _alignment_values(settings: FootSettings) -> dict[str, float]:
-    a = settings.alignment
-    return {
-        "still_accel_std": a.accel_std_m_s2,
-        "still_gyro_std": a.gyro_std_rad_s,
-        "still_rate": a.rate_rad_s,
-        "still_gravity": a.gravity_tolerance_m_s2,
-        "tilt_sigma": a.tilt_sigma_rad,
-        "quiet_tilt_sigma": a.quiet_tilt_sigma_rad,
-        "sway": a.sway_rad,
-        "bias_walk": a.bias_walk_rad_s_sqrt_s,
-        "still_window_ns": _ns(a.window_s),
-        "patience_ns": _ns(a.patience_s),
-        "stop_ns": _ns(a.stop_s),
-    }
-
-
-def _filter_values(settings: FootSettings) -> dict[str, float]:
-    f = settings.filter
-    return {
-        "accel_noise": f.accel_noise_m_s2_sqrt_hz,
-        "gyro_noise": f.gyro_noise_rad_s_sqrt_hz,
-        "accel_scale": f.accel_scale_sqrt_s,
-        "gyro_scale": f.gyro_scale_sqrt_s,
-        "velocity_sigma": f.zero_velocity_sigma_m_s,
-        "gate": f.gate,
-        "lever_sigma": f.lever_sigma_m,
-        "lever_walk": f.lever_walk_m_sqrt_s,
-        "clip_rate": f.clip_rad_s,
-        "clip_noise": f.clip_noise_rad_s_sqrt_hz,
-        "gap_accel": f.gap_accel_m_s2,
-        "gap_rate": f.gap_rate_rad_s,
-        "max_speed": f.max_speed_m_s,
-        "learned_noise": f.learned_noise,
-        "hidden_motion": f.hidden_motion_s,
-        "step_scale": f.step_scale,
-        "report_ns": _ns(settings.standing_report_s),
-    }
-
-
-def _magnetometer_values(settings: FootSettings) -> dict[str, float]:
-    m = settings.magnetometer
-    return {
-        "mag_use": m.use,
-        "mag_floor": m.disturbance_floor_ut,
-        "mag_prior": m.disturbance_prior_ut,
-        "mag_disturbed": m.disturbed_share,
-        "mag_correlation": m.correlation_m,
-        "mag_steadiness": m.steadiness_ut,
-        "mag_gate": m.gate,
-        "mag_drift_sigma": m.drift_sigma_rad_s,
-    }
-
-
-def parameters(
-    settings: FootSettings, calibration: MagnetometerCalibration = UNCALIBRATED
-) -> npt.NDArray[Any]:
-    """The settings as the kernel reads them: `PARAMETERS`, shape (1,)."""
-    record = np.zeros(1, PARAMETERS)
-    values = _detector_values(settings) | _alignment_values(settings) | _filter_values(settings)
-    for name, value in (values | _magnetometer_values(settings)).items():
-        record[name] = value
-    m = settings.magnetometer
-    record["mag_iron"] = m.uncalibrated_iron_ut if calibration == UNCALIBRATED else m.iron_ut
-    record["mag_offset"] = calibration.offset_ut
-    record["mag_matrix"] = calibration.matrix
-    return record
 
 
 def fresh_state(settings: FootSettings) -> npt.NDArray[Any]:
     """The state before the first sample: `STATE`, shape (1,)."""
     record = np.zeros(1, STATE)
     record["bias_variance"] = settings.alignment.bias_sigma_rad_s**2
+    record["accel_noise"] = settings.filter.accel_noise_m_s2_sqrt_hz
+    record["gyro_noise"] = settings.filter.gyro_noise_rad_s_sqrt_hz
     record["attitude"][0, 0] = 1.0
     record["gravity"] = 9.81
     return record

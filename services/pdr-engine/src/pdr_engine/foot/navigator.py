@@ -21,8 +21,13 @@ from pdr_engine.foot.settings import UNCALIBRATED, FootSettings, MagnetometerCal
 from pdr_engine.foot.steps import FootStepEstimate, step_from_row
 from pdr_engine.foot.tables import CHUNK, fresh_tables
 
-_FIELDS = ("fields_used", "fields_refused")  # of the magnetometer, one a stance
-COUNTERS = ("accepted", "dropped", "gaps", "clippings", "stances", "realignments", *_FIELDS)
+CONTRADICTED_STANCES, CONTRADICTED_SHARE = 10, 0.1
+# Samples; gaps of more than 50 ms; cut peaks of the gyro, cut samples of the accelerometer; what the filter did;
+# what became of the magnetometer's fields, one a stance.
+COUNTERS = (
+    *("accepted", "dropped", "gaps", "missing", "clippings", "force_clippings"),
+    *("stances", "contradictions", "realignments", "fields_used", "fields_refused"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +51,11 @@ class FootEstimates:
     def speed_m_s(self) -> Float64Array:
         """The sensor's speed, shape (k,)."""
         return self.rows["speed_m_s"]
+
+    @property
+    def attitude(self) -> Float64Array:
+        """The turn from sensor to nav axes as a quaternion w x y z, shape (k, 4)."""
+        return self.rows["attitude"]
 
     @property
     def yaw_rad(self) -> Float64Array:
@@ -116,14 +126,30 @@ class FootNavigator:
         return self._feed(0, ends=True)
 
     def counters(self) -> dict[str, int]:
-        """Counts since the start: of samples, gaps, clipped peaks, stances, realignments and fields."""
+        """Counts since the start, by the names of `COUNTERS`."""
         return {name: int(self._state[name][0]) for name in COUNTERS}
+
+    @property
+    def contradicts_itself(self) -> bool:
+        """Whether the sensors do not fit together: one stance in ten, of ten at least, begins ten sigmas off.
+
+        Left-handed axes and wrong units do that; of the recorded walks none does, whatever fault is put into it
+        (`proving_ground.evaluation.faults`), but some at 50 Hz.
+        """
+        stances, contradictions = (int(self._state[name][0]) for name in ("stances", "contradictions"))
+        return stances >= CONTRADICTED_STANCES and contradictions > CONTRADICTED_SHARE * stances
 
     @property
     def gyro_bias_rad_s(self) -> Float64Array:
         """The gyro bias as it is known now, sensor axes, shape (3,)."""
         bias: Float64Array = self._state["bias"][0].copy()
         return bias
+
+    @property
+    def lever_m(self) -> Float64Array:
+        """From the sensor to the sole's still point as it is known now, sensor axes, shape (3,)."""
+        lever: Float64Array = self._state["lever"][0].copy()
+        return lever
 
     def _feed(self, count: int, *, ends: bool) -> FootEstimates:
         self._run(count, ends)

@@ -1,8 +1,11 @@
 """Inertial units by name: their noise and bias, and what that changes in the filter.
 
 Checked against reproduced data sheets: the MTi's and the MPU-6050's figures; against public code: the GX3's
-densities. **Not checked against any sheet**: the GX3's bias, all of the GX5, all of the NGIMU. Compare them with
-your unit's own sheet, or set the terms by hand.
+densities; against a public list of the 3DM-GX5-25's figures: the GX5's densities and bias in run. **No maker's
+sheet was found** for the GX3's bias, the GX5's bias at the start, and all of the NGIMU: compare them with your
+unit's own sheet, or set the terms by hand. What units of these kinds show at rest on a shoe in the recorded sets
+is an upper bound (densities over 20 ms, `rest.listen`): GX3 0.033 to 0.040 °/s/√Hz and from 170 µg/√Hz,
+GX5 0.010 to 0.022 and from 170, NGIMU 0.013 and 250.
 
 On a shoe, shocks and scale errors outweigh most sensors' own noise, so a sheet's density is not the filter's. The
 defaults were tuned with the 3DM-GX3; for another unit the part of the noise that is the sensor's own is exchanged
@@ -45,19 +48,19 @@ class SensorNoise:
 SENSORS: dict[Sensor, SensorNoise] = {
     # 3DM-GX3-25: 80 µg/√Hz, 0.03°/s/√Hz; unchecked: 18°/h in run, ±0.25°/s at the start.
     "microstrain-gx3": SensorNoise(80 * _UG, 0.03 * _DEG, 18 * _DEG_PER_H, 0.25 * _DEG),
-    # 3DM-GX5-25, unchecked: 25 µg/√Hz, 0.005°/s/√Hz, 8°/h in run, ±0.04°/s at the start.
-    "microstrain-gx5": SensorNoise(25 * _UG, 0.005 * _DEG, 8 * _DEG_PER_H, 0.04 * _DEG),
+    # 3DM-GX5-25 with ±8 g: 80 µg/√Hz, 0.005°/s/√Hz, 8°/h in run; unchecked: ±0.04°/s at the start.
+    "microstrain-gx5": SensorNoise(80 * _UG, 0.005 * _DEG, 8 * _DEG_PER_H, 0.04 * _DEG),
     # MTi 1-series data sheet: 120 µg/√Hz, 0.007°/s/√Hz, 10°/h in run; ±16 g, ±2000°/s. Bias repeats within
     # 0.5°/s over a year (Xsens knowledge base).
     "xsens-mti": SensorNoise(120 * _UG, 0.007 * _DEG, 10 * _DEG_PER_H, 0.5 * _DEG),
-    # No noise figure was found: a stand-in, unchecked, like consumer chips of its time (300 µg/√Hz, 0.01°/s/√Hz,
-    # 36°/h), calibrated by the maker.
-    "ngimu": SensorNoise(300 * _UG, 0.01 * _DEG, 36 * _DEG_PER_H, 0.5 * _DEG),
+    # No sheet was found: densities as a recorded unit shows at rest (x-io's short walk, 250 µg/√Hz, 0.013°/s/√Hz);
+    # bias, unchecked, like consumer chips of its time (36°/h), calibrated by the maker.
+    "ngimu": SensorNoise(250 * _UG, 0.013 * _DEG, 36 * _DEG_PER_H, 0.5 * _DEG),
     # Product specification PS-MPU-6000A rev. 3.4: 400 µg/√Hz, 0.005°/s/√Hz at 10 Hz but 0.05°/s rms over 100 Hz;
     # zero rate within ±20°/s when new (a bound: three sigmas), 0.033°/s rms from 1 to 10 Hz; up to ±16 g, ±2000°/s.
     "mpu-6050": SensorNoise(400 * _UG, 0.005 * _DEG, 0.033 * _DEG, 20 / 3 * _DEG),
 }
-# A unit of which nothing is known: the worst of each.
+# A unit of which nothing is known: the worst of each, until rest tells its densities (`pdr_engine.foot.rest`).
 SENSORS["unknown"] = SensorNoise(
     *(
         max(getattr(sensor, name) for sensor in SENSORS.values())

@@ -65,14 +65,19 @@ class FilterSettings(Config, frozen=True):
 
     accel_noise_m_s2_sqrt_hz: Positive = 0.012
     gyro_noise_rad_s_sqrt_hz: Positive = 0.0006
-    # What scale errors, bandwidth and shocks add: this part of the force (without gravity) and of the rate.
-    accel_scale_sqrt_s: NonNegative = 0.006
-    gyro_scale_sqrt_s: NonNegative = 0.001
+    # What scale errors and bandwidth add: this part of the force (without gravity) and of the rate.
+    accel_scale_sqrt_s: NonNegative = 0.005
+    # What shocks add: the force's change from sample to sample may have come this much earlier or later.
+    accel_timing_s: NonNegative = 3e-4
+    gyro_scale_sqrt_s: NonNegative = 0.002
     zero_velocity_sigma_m_s: Positive = (
         0.01  # of one update at 200 Hz; scaled so that other rates weigh the same
     )
     # The learned detector's σ counts this often in the noise of an update: updates a few ms apart err alike.
     learned_noise: NonNegative = 3.0
+    # The part of the sole's learned mean motion that is expected; 0: a stance without motion. All of it fits the
+    # walks it was learned from best and lowers some others as much as nothing of it lifts them.
+    learned_motion: NonNegative = 0.5
     # What a foot creeps by in stance: a velocity of σ, for this long alike.
     hidden_motion_s: NonNegative = 0.3
     step_scale: NonNegative = 0.01  # part of a step's length that no noise explains: scale errors, sole, shoe
@@ -80,8 +85,10 @@ class FilterSettings(Config, frozen=True):
     lever_sigma_m: NonNegative = 0.1  # still point of the sole to sensor; 0 leaves a plain 9-state filter
     lever_walk_m_sqrt_s: NonNegative = 0.0
     clip_rad_s: Positive = 6.0  # no gyro of this class clips below
-    clip_noise_rad_s_sqrt_hz: NonNegative = 0.12  # 1.7 rad/s a sample at 200 Hz
-    gap_accel_m_s2: Positive = 10.0  # what a foot may do unseen in a gap of the stream
+    clip_noise_rad_s_sqrt_hz: NonNegative = 0.06  # 0.85 rad/s a sample at 200 Hz
+    clip_m_s2: Positive = 30.0  # no accelerometer for feet clips below
+    clip_excess_m_s2: NonNegative = 15.0  # sigma of what a clipped sample may have been above its limit
+    gap_accel_m_s2: Positive = 15.0  # what a foot may do unseen in a gap of the stream
     gap_rate_rad_s: Positive = 2.0
     max_speed_m_s: Positive = 15.0
 

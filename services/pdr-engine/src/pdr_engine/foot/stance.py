@@ -11,7 +11,8 @@
 import math
 
 from pdr_engine.foot.compiled import Record, compiled
-from pdr_engine.foot.memory import ADAPTIVE, ARED, DIFFERENTIAL, GYRO, MASK, NS
+from pdr_engine.foot.memory import MASK, NS
+from pdr_engine.foot.parameters import ADAPTIVE, ARED, DIFFERENTIAL, GYRO
 
 WINDOW_SAMPLES = 3  # at low rates a window is at least this many samples
 NEVER = 1e9

@@ -8,30 +8,37 @@ filter (``done``); each stage waits for its look-ahead, together less than 100 m
 import math
 from typing import Any
 
-from pdr_engine.foot.alignment import blend_bias, remember_bias, try_align, unrest, verified_still
+from pdr_engine.foot.alignment import try_align
+from pdr_engine.foot.clipping import mend, watch_force
 from pdr_engine.foot.compiled import Record, compiled
 from pdr_engine.foot.features import accumulate
-from pdr_engine.foot.intake import AFTER_LONG_GAP, DROPPED, judge, mend, push
+from pdr_engine.foot.gap import coast
+from pdr_engine.foot.intake import AFTER_LONG_GAP, DROPPED, fill, judge, missing, push
 from pdr_engine.foot.kernel import creep, forget_place, mechanise, propagate, zero_velocity
 from pdr_engine.foot.learned import look
 from pdr_engine.foot.magnetic import aid_heading, begin_field, gather_field, turn_heading
-from pdr_engine.foot.memory import (
-    ALIGNING,
-    CLIP_LAG_NS,
-    GAP_NS,
-    LATENCY_NS,
-    LEARNED,
-    MASK,
-    NS,
-    RUNNING,
-    STANCE_END_NS,
-)
+from pdr_engine.foot.memory import ALIGNING, CLIP_LAG_NS, GAP_NS, LATENCY_NS, MASK, NS, RUNNING, STANCE_END_NS
 from pdr_engine.foot.motion import classify
+from pdr_engine.foot.parameters import LEARNED
 from pdr_engine.foot.quaternion import assign, rotate, twist, wrapped
+from pdr_engine.foot.rest import (
+    blend_bias,
+    distrust_bias,
+    listen,
+    quiet,
+    remember_bias,
+    steady,
+    steady_ns,
+    unrest,
+    verified_still,
+    weigh_gravity,
+)
 from pdr_engine.foot.stance import detect
 from pdr_engine.foot.strides import begin_alignment, begin_stride, describe_stride, follow, vertical
 from pdr_engine.foot.uncertainty import widen, write_covariance
 
+UNREST, REST, STRANGE_REST = range(3)
+CONTRADICTION = 100.0  # NIS, three degrees of freedom: ten sigmas
 STOP_BLOCK_NS = 500_000_000  # a stop is verified block by block
 STRIDE_AT_LEAST_NS = 350_000_000  # the strides of a sprint take 0.4 s: what ends sooner is not a step yet
 
@@ -57,7 +64,11 @@ def feed(state: Any, parameters: Any, batch: Any, count: int, ends: bool, estima
         if verdict == AFTER_LONG_GAP:
             _flush(s, p, estimates, steps)
             _break_off(s)
+        for left in range(missing(s, sample), 0, -1):
+            fill(s, sample, left)
+            _advance(s, p, estimates, steps)
         push(s, sample)
+        watch_force(s, p, s.head - 1)
         _advance(s, p, estimates, steps)
     if ends:
         _flush(s, p, estimates, steps)
@@ -128,8 +139,12 @@ def _use(s: Record, p: Record, at: int, estimates: Any, steps: Any) -> None:
     if at == s.start:
         _begin(s, at)
     else:
-        mechanise(s, at, dt)
-        propagate(s, p, at, dt, dt > GAP_NS * NS)
+        gap = dt > GAP_NS * NS
+        if gap:
+            coast(s, at, dt)
+        else:
+            mechanise(s, at, dt)
+        propagate(s, p, at, dt, gap)
         if s.still[place]:
             creep(s, p, at, dt)
             assign(s.predicted, s.position)
@@ -176,9 +191,13 @@ def _recover(s: Record, at: int) -> None:
 
 @compiled
 def _write_estimate(s: Record, at: int, estimates: Any) -> None:
+    """A row for every sample that came."""
+    if s.filled[at & MASK]:
+        return
     row = estimates[s.estimates]
     row.time_ns = s.time_ns[at & MASK]
     row.yaw_rad = s.yaw
+    assign(row.attitude, s.attitude)
     row.stance = s.still[at & MASK] != 0
     square = 0.0
     for axis in range(3):
@@ -198,6 +217,7 @@ def _watch_stop(s: Record, p: Record, at: int) -> None:
     if s.stop_samples == 0:
         s.stop_since_ns = s.time_ns[place]
         s.stop_unrest = 0.0
+        s.stop_kind = UNREST
         remember_bias(s)
         assign(s.stop_sum, (0.0, 0.0, 0.0))
         s.stop_block = at
@@ -209,14 +229,31 @@ def _watch_stop(s: Record, p: Record, at: int) -> None:
 
 
 @compiled
+def _kind_of_rest(s: Record, p: Record, first: int, last: int) -> int:
+    """What a block of a stop shows: no rest, rest with a rate that the bias explains, or with a stranger one."""
+    if verified_still(s, p, first, last):
+        return REST
+    return STRANGE_REST if quiet(s, p, first, last) and steady(s, first, last) else UNREST
+
+
+@compiled
 def _end_block(s: Record, p: Record, at: int) -> None:
-    """Half a second of the stop is over: go on if it was still, begin a new stop if not."""
-    if not verified_still(s, p, max(s.stop_block, at - MASK // 2), at):
+    """Half a second of the stop is over: go on if it was still as those before, begin a new stop if not."""
+    first = max(s.stop_block, at - MASK // 2)
+    span_ns = s.time_ns[at & MASK] - s.stop_since_ns
+    s.stop_block = at
+    kind = _kind_of_rest(s, p, first, at)
+    if kind == UNREST or kind != s.stop_kind != UNREST:
         s.stop_samples = 0
         return
-    s.stop_unrest = max(s.stop_unrest, unrest(s, s.stop_block, at))
-    s.stop_block = at
-    span_ns = s.time_ns[at & MASK] - s.stop_since_ns
+    s.stop_kind = kind
+    s.stop_unrest = max(s.stop_unrest, unrest(s, first, at))
+    if kind == STRANGE_REST:
+        if span_ns < steady_ns(s, p, first, at):
+            return
+        distrust_bias(s)
+    weigh_gravity(s, first, at)
+    listen(s, p, first, at)
     if span_ns >= p.stop_ns:
         for axis in range(3):
             s.rate[axis] = s.stop_sum[axis] / s.stop_samples
@@ -247,6 +284,7 @@ def _watch_stance(s: Record, p: Record, at: int, steps: Any) -> None:
         begin_field(s)
         s.stance_since_ns = now_ns
         s.stances += 1
+        s.contradictions += s.nis > CONTRADICTION
     s.stance_doubt += s.doubt[place]
     s.stance_samples += 1
     gather_field(s, p, at)

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pdr_engine.foot.memory import ESTIMATE, PARAMETERS, RING, SAMPLE, STATE, STEP, fresh_state, parameters
+from pdr_engine.foot.memory import ESTIMATE, RING, SAMPLE, STATE, STEP, fresh_state
+from pdr_engine.foot.parameters import PARAMETERS, parameters
 from pdr_engine.foot.settings import UNCALIBRATED, FootSettings, MagnetometerCalibration
 
 Table = npt.NDArray[Any]
