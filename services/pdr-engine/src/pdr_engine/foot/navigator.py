@@ -131,7 +131,7 @@ class FootNavigator:
 
     @property
     def contradicts_itself(self) -> bool:
-        """Whether the sensors do not fit together: one stance in ten, of ten at least, begins ten sigmas off.
+        """Whether the sensors do not fit together: one stance in ten, of ten at least, begins seven sigmas off.
 
         Left-handed axes and wrong units do that; of the recorded walks none does, whatever fault is put into it
         (`proving_ground.evaluation.faults`), but some at 50 Hz.

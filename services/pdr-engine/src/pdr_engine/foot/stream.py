@@ -38,7 +38,7 @@ from pdr_engine.foot.strides import begin_alignment, begin_stride, describe_stri
 from pdr_engine.foot.uncertainty import widen, write_covariance
 
 UNREST, REST, STRANGE_REST = range(3)
-CONTRADICTION = 100.0  # NIS, three degrees of freedom: ten sigmas
+CONTRADICTION = 50.0  # NIS, three degrees of freedom: seven sigmas
 STOP_BLOCK_NS = 500_000_000  # a stop is verified block by block
 STRIDE_AT_LEAST_NS = 350_000_000  # the strides of a sprint take 0.4 s: what ends sooner is not a step yet
 
