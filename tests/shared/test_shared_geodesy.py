@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -141,3 +142,12 @@ def test_the_major_axis_is_the_longer_one_however_the_ellipse_lies(turn_rad: flo
 
 def test_a_covariance_that_is_none_has_no_axis() -> None:
     assert major_axis_sigma_m(-1e-18, 0.0, -1e-18) == 0.0
+
+
+def test_many_points_at_once_are_the_same_as_one_by_one() -> None:
+    frame = LocalFrame(Origin(latitude_deg=59.0, longitude_deg=18.0, height_m=20.0))
+    points = np.array([[0.0, 0.0, 0.0], [1500.0, -700.0, 30.0], [-20.0, 5000.0, -4.0]])
+    np.testing.assert_allclose(
+        frame.all_to_geodetic(points), [frame.to_geodetic(*point) for point in points], rtol=0.0, atol=1e-12
+    )
+    assert frame.all_to_geodetic(np.zeros((0, 3))).shape == (0, 3)

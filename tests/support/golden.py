@@ -18,7 +18,7 @@ from bootprint.topics import Identity
 from fusion.config import FusionConfig
 from pdr_engine.config import PdrConfig
 from proving_ground.inprocess import play_run
-from proving_ground.simulation.run_writer import write_run_folder
+from proving_ground.sensors.run_writer import write_run_folder
 from proving_ground.simulation.walker import Gait, GnssQuality, ImuQuality, simulate_walk
 from sa_hub.assembly import build_hub
 from sa_hub.hub import HubCore

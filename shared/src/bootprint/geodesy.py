@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+import numpy.typing as npt
 import pymap3d
 
 from bootprint.config import Origin
@@ -29,6 +31,10 @@ class LocalFrame:
         """ENU metres to (latitude deg, longitude deg, ellipsoidal height m)."""
         latitude, longitude, height = pymap3d.enu2geodetic(east_m, north_m, up_m, *self._at)
         return float(latitude), float(longitude), float(height)
+
+    def all_to_geodetic(self, enu_m: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Points (n, 3) ENU metres to rows of (latitude deg, longitude deg, ellipsoidal height m), at once."""
+        return np.column_stack(pymap3d.enu2geodetic(*enu_m.T, *self._at)).astype(np.float64)
 
 
 def wrap_angle(angle_rad: float) -> float:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from bootprint.config import Origin
 from bootprint.errors import RecordingError
-from proving_ground.simulation.run_writer import write_run_folder
+from proving_ground.sensors.run_writer import write_run_folder
 from proving_ground.simulation.walker import Gait, GnssQuality, simulate_walk
 from sensor_gateway.recordings import load_runs
 from sensor_gateway.recordings.run import Run, Truth

@@ -8,8 +8,17 @@ from pathlib import Path
 import numpy as np
 
 from bootprint.errors import RecordingError
-from bootprint.messages import GnssFix, ImuBatch, Message, Pressure
-from sensor_gateway.recordings.run import FloatArray, GnssSeries, ImuSeries, Kind, PressureSeries, Run
+from bootprint.messages import CameraMotion, GnssFix, ImuBatch, Message, Pressure, Range, symmetric
+from sensor_gateway.recordings.run import (
+    CameraSeries,
+    FloatArray,
+    GnssSeries,
+    ImuSeries,
+    Kind,
+    PressureSeries,
+    RangeSeries,
+    Run,
+)
 from sensor_gateway.recordings.tables import imu_series
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -24,6 +33,8 @@ class _Heard:
     imu: dict[str, list[ImuBatch]] = field(default_factory=lambda: defaultdict(list))
     pressure: list[Pressure] = field(default_factory=list)
     gnss: list[GnssFix] = field(default_factory=list)
+    camera: list[CameraMotion] = field(default_factory=list)
+    ranges: list[Range] = field(default_factory=list)
 
     def take(self, source: str, message: Message) -> None:
         """Keep a sensor message, pass over all others."""
@@ -33,6 +44,10 @@ class _Heard:
             self.pressure.append(message)
         elif isinstance(message, GnssFix):
             self.gnss.append(message)
+        elif isinstance(message, CameraMotion):
+            self.camera.append(message)
+        elif isinstance(message, Range):
+            self.ranges.append(message)
 
 
 def recognises(path: Path) -> bool:
@@ -66,6 +81,8 @@ def _run(path: Path, name: str, heard: _Heard) -> Run:
         imus={place: _imu(path, batches, zero_ns) for place, batches in sorted(heard.imu.items())},
         pressure=_pressure(heard.pressure, zero_ns) if heard.pressure else None,
         gnss=_gnss(heard.gnss, zero_ns) if heard.gnss else None,
+        camera=_camera(heard.camera, zero_ns) if heard.camera else None,
+        ranges=_ranges(heard.ranges, zero_ns) if heard.ranges else None,
         source="bus recording",
     )
 
@@ -114,3 +131,35 @@ def _gnss(fixes: Sequence[GnssFix], zero_ns: int) -> GnssSeries:
         _column(fixes, lambda fix: fix.speed_m_s),
         np.rad2deg(_column(fixes, lambda fix: fix.course_rad)),
     )
+
+
+def _camera(motions: Sequence[CameraMotion], zero_ns: int) -> CameraSeries:
+    """The covariance comes back as one sigma for all axes of translation and one for rotation: their means."""
+    variances = np.array([_variances(motion) for motion in motions])
+    return CameraSeries(
+        np.array([(motion.start_time_ns - zero_ns) / NS_PER_S for motion in motions]),
+        _seconds(motions, zero_ns),
+        np.array([motion.translation_m for motion in motions]),
+        np.array([motion.rotation_rad for motion in motions]),
+        np.sqrt(variances[:, :3].mean(axis=1)),
+        np.sqrt(variances[:, 3:].mean(axis=1)),
+        np.array([_or_nan(motion.confidence_pct) for motion in motions]),
+    )
+
+
+def _variances(motion: CameraMotion) -> FloatArray:
+    """The covariance's diagonal (6,), NaN where it is unknown."""
+    return np.full(6, np.nan) if motion.covariance is None else np.diag(symmetric(motion.covariance))
+
+
+def _ranges(messages: Sequence[Range], zero_ns: int) -> RangeSeries:
+    return RangeSeries(
+        _seconds(messages, zero_ns),
+        tuple(message.peer for message in messages),
+        np.array([message.distance_m for message in messages]),
+        np.array([_or_nan(message.sigma_m) for message in messages]),
+    )
+
+
+def _or_nan(value: float | None) -> float:
+    return np.nan if value is None else value

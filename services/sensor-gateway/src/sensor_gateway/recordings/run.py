@@ -70,12 +70,28 @@ class GnssSeries:
 
 @dataclass(frozen=True, slots=True)
 class CameraSeries:
-    """Camera motions: start and end (n,) s, translation m and rotation vector rad (n, 3), as in CameraMotion."""
+    """Camera motions: start and end (n,) s, translation m and rotation vector rad (n, 3), as in CameraMotion.
+
+    ``translation_sigma_m`` and ``rotation_sigma_rad`` (n,), of every axis, and ``confidence_pct`` (n,) if known.
+    """
 
     start_time_s: FloatArray
     time_s: FloatArray
     translation_m: FloatArray
     rotation_rad: FloatArray
+    translation_sigma_m: FloatArray | None = None
+    rotation_sigma_rad: FloatArray | None = None
+    confidence_pct: FloatArray | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RangeSeries:
+    """Ranges: ``time_s`` (n,), the ``peer`` of each, ``distance_m`` and ``sigma_m`` (n,), NaN if unknown."""
+
+    time_s: FloatArray
+    peer: tuple[str, ...]
+    distance_m: FloatArray
+    sigma_m: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +110,7 @@ class Run:
     pressure: PressureSeries | None = None
     gnss: GnssSeries | None = None
     camera: CameraSeries | None = None
+    ranges: RangeSeries | None = None
     origin: tuple[float, float, float] | None = None
     source: str = ""
 

@@ -1,7 +1,7 @@
 """Run folders: bring your own data. CSV files with fixed names and headers, and an optional strict ``run.toml``.
 
 Any of ``left_foot.csv right_foot.csv body.csv`` (``time_s,ax,ay,az,gx,gy,gz[,mx,my,mz]``: s, m/s², rad/s, µT,
-sensor axes as mounted), ``pressure.csv``, ``gnss.csv``, ``camera_motion.csv`` and ``truth.csv``
+sensor axes as mounted), ``pressure.csv``, ``gnss.csv``, ``camera_motion.csv``, ``ranges.csv`` and ``truth.csv``
 (``time_s,east_m,north_m[,up_m]``; way-points are enough). An empty cell is unknown.
 """
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from bootprint.config import Config, Origin, load_toml
 from bootprint.errors import RecordingError
+from sensor_gateway.recordings.range_table import read_ranges
 from sensor_gateway.recordings.run import (
     CameraSeries,
     GnssSeries,
@@ -28,12 +29,15 @@ PLACES = ("left_foot", "right_foot", "body")
 _IMU = ("time_s", "ax", "ay", "az", "gx", "gy", "gz")
 _MAG = ("mx", "my", "mz")
 _GNSS = ("lat_deg", "lon_deg", "alt_m", "h_acc_m", "v_acc_m", "satellites", "speed_m_s", "course_deg")
-_OPTIONAL_SENSORS = ("pressure", "gnss", "camera_motion")
+_CAMERA = ("start_time_s", "time_s", "tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad")
+_CAMERA_DOUBT = ("translation_sigma_m", "rotation_sigma_rad", "confidence_pct")
+_RANGES = "ranges"  # not only numbers, so it has a reader of its own
+_OPTIONAL_SENSORS = ("pressure", "gnss", "camera_motion", _RANGES)
 _HEADERS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     **dict.fromkeys(PLACES, (_IMU, _MAG)),
     "pressure": (("time_s", "pressure_pa"), ()),
     "gnss": (("time_s", "lat_deg", "lon_deg"), _GNSS[2:]),
-    "camera_motion": (("start_time_s", "time_s", "tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad"), ()),
+    "camera_motion": (_CAMERA, _CAMERA_DOUBT),
     "truth": (("time_s", "east_m", "north_m"), ("up_m",)),
 }
 
@@ -60,7 +64,8 @@ def _looks_like(path: Path) -> bool:
 def read_folder(folder: Path) -> list[Run]:
     """The folder's one run; RecordingError or ConfigError on anything wrong in it."""
     notes = load_toml(folder / "run.toml", RunNotes) if (folder / "run.toml").exists() else RunNotes()
-    tables = {name: _read(folder / f"{name}.csv", name) for name in _sensors(folder, notes)}
+    sensors = _sensors(folder, notes)
+    tables = {name: _read(folder / f"{name}.csv", name) for name in sensors if name != _RANGES}
     imus = {place: _imu(tables[place]) for place in PLACES if place in tables}
     truth = folder / "truth.csv"
     return [
@@ -73,6 +78,7 @@ def read_folder(folder: Path) -> list[Run]:
             pressure=_pressure(tables["pressure"]) if "pressure" in tables else None,
             gnss=_gnss(tables["gnss"]) if "gnss" in tables else None,
             camera=_camera(tables["camera_motion"]) if "camera_motion" in tables else None,
+            ranges=read_ranges(folder / f"{_RANGES}.csv") if _RANGES in sensors else None,
             origin=_origin(notes),
             source=notes.licence,
         )
@@ -140,7 +146,8 @@ def _gnss(table: Table) -> GnssSeries:
 def _camera(table: Table) -> CameraSeries:
     translation = table.columns("tx_m", "ty_m", "tz_m")
     rotation = table.columns("rx_rad", "ry_rad", "rz_rad")
-    return CameraSeries(table.column("start_time_s"), table.column("time_s"), translation, rotation)
+    doubts = (table.column(name) if name in table.header[-1] else None for name in _CAMERA_DOUBT)
+    return CameraSeries(table.column("start_time_s"), table.column("time_s"), translation, rotation, *doubts)
 
 
 def _origin(notes: RunNotes) -> tuple[float, float, float] | None:

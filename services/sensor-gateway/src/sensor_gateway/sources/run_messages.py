@@ -18,14 +18,24 @@ from bootprint.messages import (
     Int64Array,
     Message,
     Pressure,
+    Range,
     Vector3,
+    upper_triangle,
 )
 from bootprint.topics import Identity
 from sensor_gateway.batching import batch_bounds
-from sensor_gateway.recordings.run import CameraSeries, FloatArray, GnssSeries, ImuSeries, PressureSeries, Run
+from sensor_gateway.recordings.run import (
+    CameraSeries,
+    FloatArray,
+    GnssSeries,
+    ImuSeries,
+    PressureSeries,
+    RangeSeries,
+    Run,
+)
 from sensor_gateway.stamps import due_ns
 
-PRESSURE_SOURCE, GNSS_SOURCE, CAMERA_SOURCE = "body", "gnss", "camera"
+PRESSURE_SOURCE, GNSS_SOURCE, CAMERA_SOURCE, RANGE_SOURCE = "body", "gnss", "camera", "uwb"
 BATCH_AGE_NS = 60_000_000
 AnyMessage = TypeVar("AnyMessage", bound=Message)
 _log = structlog.get_logger()
@@ -48,6 +58,8 @@ def run_messages(
         streams.append(_sent(identity, "gnss", GNSS_SOURCE, _gnss(run.gnss, start_ns)))
     if run.camera is not None:
         streams.append(_sent(identity, "camera_motion", CAMERA_SOURCE, _camera(run.camera, start_ns)))
+    if run.ranges is not None:
+        streams.append(_sent(identity, "range", RANGE_SOURCE, _ranges(run.ranges, start_ns)))
     return heapq.merge(*streams, key=lambda envelope: (due_ns(envelope.message), envelope.address))
 
 
@@ -146,9 +158,36 @@ def _camera(series: CameraSeries, start_ns: int) -> Iterator[CameraMotion]:
             start_time_ns=int(starts_ns[row]),
             translation_m=_vector(series.translation_m[row]),
             rotation_rad=_vector(series.rotation_rad[row]),
+            covariance=_camera_covariance(series, row),
+            confidence_pct=None if series.confidence_pct is None else _known(series.confidence_pct[row]),
         )
 
     return _rows(message, rows, _utc_ns(series.time_s[rows], start_ns))
+
+
+def _camera_covariance(series: CameraSeries, row: int) -> tuple[float, ...] | None:
+    """Axes alike and independent; None where either sigma is unknown."""
+    if series.translation_sigma_m is None or series.rotation_sigma_rad is None:
+        return None
+    sigmas = np.repeat([series.translation_sigma_m[row], series.rotation_sigma_rad[row]], 3)
+    return upper_triangle(np.diag(sigmas**2)) if np.isfinite(sigmas).all() else None
+
+
+def _ranges(series: RangeSeries, start_ns: int) -> Iterator[Range]:
+    """Every range of every peer: two peers may answer at the same time, so stamps need not rise."""
+    rows = np.flatnonzero(np.isfinite(series.time_s) & np.isfinite(series.distance_m))
+    rows = rows[np.argsort(series.time_s[rows], kind="stable")]
+
+    def message(row: int, time_ns: int, sequence: int) -> Range:
+        return Range(
+            time_ns=time_ns,
+            sequence=sequence,
+            peer=series.peer[row],
+            distance_m=float(series.distance_m[row]),
+            sigma_m=_known(series.sigma_m[row]),
+        )
+
+    return _rows(message, np.asarray(rows, dtype=np.int64), _utc_ns(series.time_s[rows], start_ns))
 
 
 def _vector(values: FloatArray) -> Vector3:
