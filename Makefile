@@ -44,6 +44,7 @@ golden: $(READY) ## write the golden outputs anew (ARGS=--walk: the small record
 
 figures: $(READY) ## make anew the figures and generated pages of the documents
 	$(BIN)/bootprint topics > docs/topics.md
+	$(BIN)/python -m proving_ground.scenario.keys_page docs/scenarios.md
 	$(BIN)/python -m proving_ground.evaluation.figures $(or $(BOOTPRINT_DATA),../shared/data) docs
 	$(BIN)/python -m proving_ground.agreement.report $(or $(BOOTPRINT_DATA),../shared/data) docs
 

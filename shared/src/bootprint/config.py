@@ -12,7 +12,7 @@ from typing import Annotated, Any, TypeVar
 
 import msgspec
 
-from bootprint.config_errors import explain
+from bootprint.config_errors import Misfit, explain
 from bootprint.errors import ConfigError
 from bootprint.messages import Latitude, Longitude
 from bootprint.topics import Identity, check_part
@@ -161,23 +161,35 @@ def load_toml(path: Path, type_: type[T]) -> T:
 
 def convert(values: object, type_: type[T], where: str) -> T:
     """Convert plain values strictly; ConfigError tells ``where`` and what is known there."""
-    _check_numbers(values, "", where)
+    fitted = fit(values, type_)
+    if isinstance(fitted, Misfit):
+        raise ConfigError(f"{where}: {fitted.reason}")
+    return fitted
+
+
+def fit(values: object, type_: type[T]) -> T | Misfit:
+    """Convert plain values strictly, or tell the key at fault and why: for files that know their lines."""
+    if (misfit := _unfit_number(values, "")) is not None:
+        return misfit
     try:
         return msgspec.convert(values, type_)
     except msgspec.ValidationError as error:
-        raise ConfigError(f"{where}: {explain(str(error), values, type_)}") from error
+        return explain(str(error), values, type_)
 
 
-def _check_numbers(value: object, key: str, where: str) -> None:
-    """TOML knows ``nan``, ``inf`` and 1e300, types do not refuse them: ConfigError names the key they stand at."""
+def _unfit_number(value: object, key: str) -> Misfit | None:
+    """TOML knows ``nan``, ``inf`` and 1e300, types do not refuse them: the first key where one stands."""
     if isinstance(value, dict):
-        for name, inner in value.items():
-            _check_numbers(inner, f"{key}.{name}" if key else str(name), where)
-    elif isinstance(value, list):
-        for index, inner in enumerate(value):
-            _check_numbers(inner, f"{key}[{index}]", where)
-    elif isinstance(value, float | int) and not abs(value) <= (largest := _largest(key)):
-        raise ConfigError(f"{where}: {key} is {value}: expected a number within ±{largest:g}")
+        inside = (
+            _unfit_number(inner, f"{key}.{name}" if key else str(name)) for name, inner in value.items()
+        )
+        return next(filter(None, inside), None)
+    if isinstance(value, list):
+        inside = (_unfit_number(inner, f"{key}[{index}]") for index, inner in enumerate(value))
+        return next(filter(None, inside), None)
+    if isinstance(value, float | int) and not abs(value) <= (largest := _largest(key)):
+        return Misfit(key, f"{key} is {value}: expected a number within ±{largest:g}")
+    return None
 
 
 def _largest(key: str) -> float:

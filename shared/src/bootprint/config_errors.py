@@ -19,6 +19,14 @@ _PLAIN = {"object": "a table", "array": "a list", "str": "text", "bool": "true o
 
 
 @dataclass(frozen=True, slots=True)
+class Misfit:
+    """What is wrong: the key at fault as one writes it in TOML (``rooms[2].name``; empty: the file), and why."""
+
+    key: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class _Place:
     """A value, what may stand there, and its path as one writes it in TOML."""
 
@@ -76,8 +84,8 @@ class _Place:
         ]
 
 
-def explain(message: str, values: object, type_: type) -> str:
-    """msgspec's validation message as a sentence for the one who wrote the file."""
+def explain(message: str, values: object, type_: type) -> Misfit:
+    """msgspec's validation message as a key and a sentence for the one who wrote the file."""
     match = _MESSAGE.match(message)
     assert match is not None
     what, at = match["what"], match["at"] or "$"
@@ -85,10 +93,12 @@ def explain(message: str, values: object, type_: type) -> str:
     for step in _STEP.finditer(at):
         parent, place = place, place.step(step["name"], step["index"])
     if unknown := _UNKNOWN.match(what):
-        return _unknown_key(unknown[1], place)
+        key = f"{place.path}.{unknown[1]}" if place.path else unknown[1]
+        return Misfit(key, _unknown_key(unknown[1], place))
     if missing := _MISSING.match(what):
-        return f"{place.path + ' lacks ' if place.path else 'missing '}the key {missing[1]!r}"
-    return _wrong_value(what, place, parent)
+        lacks = f"{place.path + ' lacks ' if place.path else 'missing '}the key {missing[1]!r}"
+        return Misfit(place.path, lacks)
+    return Misfit(place.path, _wrong_value(what, place, parent))
 
 
 def _unknown_key(key: str, place: _Place) -> str:
@@ -112,10 +122,14 @@ def _expected(what: str) -> str:
     """``Expected `int`, got `str``` as "int"; empty if the message is of another kind."""
     match = re.match(r"Expected (?P<kind>.*?)(?:, got .*)?\Z", what)
     return (
-        re.sub(r"`(\w+)`", lambda word: _PLAIN.get(word[1], word[1]), match["kind"]).replace("`", "")
+        re.sub(r"`([\w |]+)`", lambda words: _in_plain_words(words[1]), match["kind"]).replace("`", "")
         if match
         else ""
     )
+
+
+def _in_plain_words(types: str) -> str:
+    return " or ".join(_PLAIN.get(word, word) for word in types.split(" | "))
 
 
 def _flat(types: Iterable[inspect.Type]) -> tuple[inspect.Type, ...]:
@@ -124,6 +138,8 @@ def _flat(types: Iterable[inspect.Type]) -> tuple[inspect.Type, ...]:
     for type_ in types:
         if isinstance(type_, inspect.UnionType):
             flat.extend(_flat(type_.types))
+        elif isinstance(type_, inspect.Metadata):
+            flat.extend(_flat([type_.type]))
         else:
             flat.append(type_)
     return tuple(flat)

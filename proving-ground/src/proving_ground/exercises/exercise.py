@@ -1,10 +1,12 @@
-"""What an exercise is: four soldiers with their walks and truth, simulated or recorded."""
+"""What an exercise is: soldiers with their walks and truth, simulated or recorded; hubs, nets and faults."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
 from bootprint.config import Origin
 from bootprint.errors import RecordingError
+from proving_ground.exercises.emulated_radio import NetProfile
 from proving_ground.sensors.run_writer import write_run_folder
 from proving_ground.simulation.walker import Gait, GnssQuality, simulate_walk
 from sensor_gateway.recordings import load_runs
@@ -34,6 +36,8 @@ class Soldier:
     truth: Truth
     start: dict[str, float]
     simulated: bool
+    unit: str = UNIT
+    role: str = "rifleman"
 
     @property
     def sources(self) -> list[str]:
@@ -42,11 +46,53 @@ class Soldier:
 
 
 @dataclass(frozen=True)
+class Hub:
+    """A computer without a soldier: a leader's or a command post's."""
+
+    id: str
+    number: int
+    callsign: str
+    unit: str
+    role: str
+
+
+@dataclass(frozen=True)
+class Net:
+    """A radio net: what its air is like, the computers on it, and spans (from, until) s when it is down."""
+
+    profile: NetProfile
+    members: tuple[str, ...]
+    outages_s: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something that breaks at ``at_s``: a kind, whose it is, and what more belongs to the kind."""
+
+    at_s: float
+    kind: str
+    target: str
+    details: dict[str, str | float] = field(default_factory=dict)
+
+
+_DEMO_HUBS = (
+    Hub(LEADER, 10, "Alpha", UNIT, "squad_leader"),
+    Hub(COMMAND_POST, 100, "Zero", "hq", "command_post"),
+)
+
+
+@dataclass(frozen=True)
 class Exercise:
-    """The squad and how long its longest walk takes."""
+    """Who takes part, with everything they measure; ``storeys_m`` are heights of the floors by level."""
 
     soldiers: tuple[Soldier, ...]
     origin: Origin = ORIGIN
+    name: str = "demo"
+    begins: datetime = datetime(2026, 6, 1, 8, 0, tzinfo=UTC)
+    storeys_m: dict[int, float] = field(default_factory=lambda: {0: 0.0, 1: STOREY_M})
+    hubs: tuple[Hub, ...] = _DEMO_HUBS
+    nets: tuple[Net, ...] = ()
+    faults: tuple[Fault, ...] = ()
 
     @property
     def duration_s(self) -> float:

@@ -1,0 +1,12 @@
+"""`bootprint exercise …`: the group of commands; modules add theirs with a function ``add_to(app)``."""
+
+import typer
+
+from proving_ground.exercises import scenario_command
+
+
+def register(app: typer.Typer) -> None:
+    """Add the group."""
+    group = typer.Typer(no_args_is_help=True, help="Simulated exercises: what there is, what it looks like.")
+    scenario_command.add_to(group)
+    app.add_typer(group, name="exercise")
