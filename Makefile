@@ -21,7 +21,7 @@ $(READY): constraints.txt pyproject.toml $(ROOMS:%=%/pyproject.toml)
 	$(BIN)/python -c 'from pdr_engine.foot import warm_up; warm_up()' # compile the foot filter once
 	@touch $@
 
-demo: $(READY) ## four soldiers, six computers, one picture; ARGS are passed on
+demo: $(READY) ## eight soldiers clear a building, one picture; ARGS are passed on
 	$(BIN)/bootprint demo $(ARGS)
 
 test: $(READY) ## lint, types and all tests

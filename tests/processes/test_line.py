@@ -1,7 +1,7 @@
 """The whole line as real processes over real routers: one soldier's walk to the command post over the radio hop."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +11,9 @@ from bootprint.messages import Position
 from bootprint.stopping import Stop
 from bootprint.topics import Identity
 from proving_ground.exercises.emulated_radio import NetCounts
-from proving_ground.exercises.exercise import COMMAND_POST, LEADER, REALM, UNIT, Exercise, Soldier
-from proving_ground.exercises.observer import Heard
+from proving_ground.exercises.exercise import REALM, Soldier
+from proving_ground.exercises.heard import Heard
+from proving_ground.exercises.squad import COMMAND_POST, LEADER, UNIT, squad_of
 from proving_ground.exercises.stage import Play, Stage
 from proving_ground.inprocess import play_run, positions_of
 from support.golden import FUSION, ORIGIN, PDR, START, small_walk
@@ -37,7 +38,7 @@ class Played:
 def played(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Played]:
     run = small_walk()
     soldier = Soldier("a1", 1, "Adler", run, run.truth["body"], START, simulated=True)
-    exercise = Exercise((soldier,), ORIGIN)
+    exercise = replace(squad_of((soldier,), "line"), origin=ORIGIN)
     folder = tmp_path_factory.mktemp("line")
     with Stage(exercise, Play(folder, SPEED)) as stage:
         stage.wait_ready(Stop())
@@ -47,9 +48,10 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Played]:
             timeout_s=60.0,
             what="the walk's end",
         )
+        stage.observers.close()
         yield Played(
             folder,
-            {name: observer.heard() for name, observer in stage.observers.items()},
+            stage.observers.heard(),
             stage.start_ns,
             len(stage.processes.pids),
             {name: net.counts for name, net in stage.nets.items()},
@@ -90,14 +92,14 @@ def test_nothing_was_late_lost_or_refused(played: Played) -> None:
 def test_the_command_post_hears_of_the_soldier_over_the_air_only(played: Played) -> None:
     heard = played.heard[COMMAND_POST]
     assert heard.positions == [], "a position crossed between computers without the radio"
-    tracks = [track for _, track in heard.tracks if track.soldier == "a1"]
-    assert tracks
-    assert all(track.via != "own" for track in tracks)
-    newest = tracks[-1]
+    reports = len(heard.reports["a1"])
+    assert reports > 0
+    newest = heard.newest["a1"]
+    assert newest.via == "company"
     last = played.heard["a1"].positions[-1]
     assert abs(newest.latitude_deg - last.latitude_deg) * 111_000 < 4.0
-    assert played.nets["squad"].datagrams >= len(tracks)
-    assert played.nets["company"].datagrams >= len(tracks)
+    assert played.nets["squad"].datagrams >= reports
+    assert played.nets["company"].datagrams >= reports
 
 
 def test_every_computer_reports_its_links_within_budget(played: Played) -> None:

@@ -20,7 +20,7 @@ def on_air(
     for each in sockets:
         each.bind(("127.0.0.1", 0))
         each.settimeout(5.0)
-    net = EmulatedNet(profile, [each.getsockname()[1] for each in sockets], speed)
+    net = EmulatedNet(profile, {f"m{n}": each.getsockname()[1] for n, each in enumerate(sockets)}, speed)
     net.start()
     try:
         yield net, sockets

@@ -2,7 +2,7 @@
 
 import math
 
-import numpy as np
+import pymap3d
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -144,10 +144,29 @@ def test_a_covariance_that_is_none_has_no_axis() -> None:
     assert major_axis_sigma_m(-1e-18, 0.0, -1e-18) == 0.0
 
 
-def test_many_points_at_once_are_the_same_as_one_by_one() -> None:
-    frame = LocalFrame(Origin(latitude_deg=59.0, longitude_deg=18.0, height_m=20.0))
-    points = np.array([[0.0, 0.0, 0.0], [1500.0, -700.0, 30.0], [-20.0, 5000.0, -4.0]])
-    np.testing.assert_allclose(
-        frame.all_to_geodetic(points), [frame.to_geodetic(*point) for point in points], rtol=0.0, atol=1e-12
-    )
-    assert frame.all_to_geodetic(np.zeros((0, 3))).shape == (0, 3)
+@settings(max_examples=300)
+@given(
+    latitude_deg=st.floats(-89.9, 89.9),
+    longitude_deg=st.floats(-180.0, 180.0),
+    height_m=st.floats(-500.0, 20_000.0),
+    east_m=near,
+    north_m=near,
+    up_m=st.floats(-500.0, 9_000.0),
+)
+def test_the_closed_form_is_the_library_s_answer(
+    latitude_deg: float, longitude_deg: float, height_m: float, east_m: float, north_m: float, up_m: float
+) -> None:
+    """pymap3d solves the same equations by another way (You 2000)."""
+    found = frame(latitude_deg, longitude_deg, height_m).to_geodetic(east_m, north_m, up_m)
+    expected = pymap3d.enu2geodetic(east_m, north_m, up_m, latitude_deg, longitude_deg, height_m)
+    across = math.cos(math.radians(found[0]))  # of a degree of longitude near a pole little is left
+    assert found[0] == pytest.approx(expected[0], abs=1e-9)
+    assert (found[1] - expected[1] + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-9 / across)
+    assert found[2] == pytest.approx(expected[2], abs=1e-6)
+
+
+@pytest.mark.parametrize(("latitude_deg", "z_m"), [(90.0, B_M + 100.0), (-90.0, -B_M - 100.0)])
+def test_a_hundred_metres_above_the_poles(latitude_deg: float, z_m: float) -> None:
+    found = frame(latitude_deg, 0.0).to_geodetic(0.0, 0.0, 100.0)
+    assert found[0] == pytest.approx(latitude_deg)
+    assert found[2] == pytest.approx(abs(z_m) - B_M, abs=1e-6)

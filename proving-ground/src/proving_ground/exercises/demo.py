@@ -1,24 +1,15 @@
-"""`bootprint demo`: four soldiers, six computers, eighteen processes, two radio nets, one picture; then a score."""
+"""`bootprint demo`: an exercise as real processes, live: soldiers, radio nets, one picture; then a score."""
 
 import math
-import time
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from bootprint.commands.options import write_json
 from bootprint.errors import ConfigError
-from bootprint.stopping import Stop
 
-if TYPE_CHECKING:
-    from proving_ground.exercises.stage import Stage
-
-_SETTLE_S = 4.0  # event seconds after the last walk, for the last reports to arrive
-_LINE_EVERY_S = 5.0  # host seconds between lines of a headless demo
-_REFRESH_S = 0.5
-_EXIT_INTERRUPTED = 130
+EXIT_INTERRUPTED = 130
+_SCENARIO = "building-clearing"
 
 
 def register(app: typer.Typer) -> None:
@@ -38,8 +29,11 @@ def demo(
     ] = None,
     speed: Annotated[float, typer.Option(help="Exercise time runs this many times as fast.")] = 1.0,
     loss: Annotated[
-        float, typer.Option(help="Share of radio frames that each receiver misses, 0 to 0.9.")
-    ] = 0.0,
+        float | None,
+        typer.Option(
+            help="Share of radio frames that each receiver misses, 0 to 0.9 (default: the nets' own)."
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the simulated walks.")] = 1,
     report: Annotated[
         Path, typer.Option(help="Folder for result.json, report.html and the processes' logs.")
@@ -50,108 +44,31 @@ def demo(
 ) -> None:
     """Show the whole system at work: sensors to boots to fusion to radio to the command post's picture.
 
-    Starts a zenoh router for each of six computers and, as processes of their own, gateway, PDR engine, fusion
-    and hub for four soldiers, a squad leader's hub and a command post's hub. The computers are joined only by two
-    emulated radio nets. Ends with scores against truth.
+    Starts a zenoh router for each computer and, as processes of their own, gateway, PDR engine, fusion and hub for
+    every soldier, and a hub for every post. The computers are joined only by emulated radio nets. Ends with scores
+    against truth.
 
     Example: bootprint demo --data recordings --speed 5
     """
-    _check(speed, loss, duration)
-    _check_outputs(report, json_out)
-    from proving_ground.exercises.exercise import recorded_exercise, simulated_exercise
-    from proving_ground.exercises.processes import ProcessError
-    from proving_ground.exercises.report import print_scores, write_report
-    from proving_ground.exercises.result import result_of
-    from proving_ground.exercises.stage import Play, Stage
+    check_options(speed, loss, duration)
+    from proving_ground.exercises.playing import Playing, check_outputs, play, prepare, write_outcome
+    from proving_ground.exercises.settings import with_loss
+    from proving_ground.exercises.squad import recorded_squad
 
-    exercise = recorded_exercise(data) if data else simulated_exercise(report / "walks", seed)
-    length_s = exercise.duration_s + _SETTLE_S if duration is None else duration
-    fault: ProcessError | None = None
-    with Stop() as stop, Stage(exercise, Play(report, speed, loss)) as stage:
-        try:
-            Runner(stage, length_s, stop, headless=headless).run()
-        except ProcessError as error:  # what was played until then is scored all the same
-            fault = error
-        result = result_of(stage)
-    write_report(report, exercise, result)
-    if json_out != "-":
-        print_scores(result)
-    if json_out is not None:
-        write_json(result.figures, json_out)
-    if fault is not None:
-        raise fault
-    if stop.is_set():
-        raise typer.Exit(_EXIT_INTERRUPTED)
+    check_outputs(report, json_out)
+    how = Playing(report, speed=speed, duration_s=duration, headless=headless)
+    exercise = prepare(_SCENARIO, seed, how) if data is None else recorded_squad(data)
+    outcome = play(with_loss(exercise, loss), how)
+    write_outcome(outcome, report, json_out)
+    if outcome.stopped:
+        raise typer.Exit(EXIT_INTERRUPTED)
 
 
-def _check_outputs(report: Path, json_out: str | None) -> None:
-    """ConfigError now, rather than after the whole exercise, if its results cannot be written."""
-    targets = [report / "result.json", *([Path(json_out)] if json_out not in (None, "-") else [])]
-    try:
-        report.mkdir(parents=True, exist_ok=True)
-        for target in targets:
-            with target.open("a", encoding="utf-8"):
-                pass
-    except OSError as error:
-        raise ConfigError(f"{error.filename}: cannot be written: {error.strerror}") from error
-
-
-def _check(speed: float, loss: float, duration: float | None) -> None:
+def check_options(speed: float, loss: float | None, duration: float | None) -> None:
+    """ConfigError for numbers that make no exercise."""
     if not (math.isfinite(speed) and 0 < speed <= 100):
         raise ConfigError(f"--speed {speed:g} must be above 0 and at most 100")
-    if not 0.0 <= loss <= 0.9:
+    if loss is not None and not 0.0 <= loss <= 0.9:
         raise ConfigError(f"--loss {loss:g} must be a share from 0 to 0.9, e.g. 0.1 for one frame in ten")
     if duration is not None and not duration > 0:
         raise ConfigError(f"--duration {duration:g} must be a positive number of seconds")
-
-
-@dataclass
-class Runner:
-    """Plays a stage to its end, showing it."""
-
-    stage: "Stage"
-    length_s: float
-    stop: Stop
-    headless: bool
-
-    def run(self) -> None:
-        """Until the exercise has lasted its length or a signal came."""
-        from rich.console import Console
-
-        console = Console(stderr=True)
-        with console.status(f"starting {len(self.stage.processes.pids)} processes …"):
-            self.stage.wait_ready(self.stop)
-        if self.stop.is_set():
-            return
-        self.stage.start_walks(self.stop)
-        console.print(f"{len(self.stage.processes.pids)} processes run, walks begin")
-        if self.headless or not console.is_terminal:
-            self._lines(console)
-        else:
-            self._live(console)
-
-    def _going(self) -> bool:
-        self.stage.processes.check()
-        return self.stage.elapsed_s < self.length_s and not self.stop.is_set()
-
-    def _lines(self, console: Any) -> None:
-        from proving_ground.exercises.live import LiveView
-
-        view = LiveView(self.stage, self.length_s)
-        next_line = time.monotonic()
-        while self._going():
-            if time.monotonic() >= next_line:
-                next_line += _LINE_EVERY_S
-                console.print(view.line(), highlight=False, soft_wrap=True)
-            self.stop.wait(0.1)
-
-    def _live(self, console: Any) -> None:
-        from rich.live import Live
-
-        from proving_ground.exercises.live import LiveView
-
-        view = LiveView(self.stage, self.length_s)
-        with Live(view.render(), console=console, refresh_per_second=4, screen=False) as live:
-            while self._going():
-                live.update(view.render())
-                self.stop.wait(_REFRESH_S)

@@ -1,16 +1,18 @@
 """An emulated radio net: every datagram a member sends reaches all others, at the net's rate, late, or not at all.
 
-Members are hubs with ordinary UDP links whose peer is this net's port. The channel carries one datagram at a
-time (rate), each member hears it after the latency, and may miss it (loss, drawn from a seeded generator). Times
-are event time: at ``--speed N`` the net runs N times as fast. It only handles loopback addresses.
+`Air` is the net in event time, pure: one datagram at a time (rate), each member hears it after the latency, and may
+miss it (loss, drawn from a seeded generator; outages). `EmulatedNet` puts it between real sockets: members are hubs
+with ordinary UDP links whose peer is this net's port. At ``--speed N`` it runs N times as fast. Loopback only.
 """
 
 import heapq
+import math
 import random
 import selectors
 import socket
 import threading
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 _RECEIVE_BYTES = 2048
@@ -40,30 +42,104 @@ class NetCounts:
 
 
 @dataclass(order=True)
-class _Delivery:
+class Delivery:
+    """A datagram that is to reach a member when event time is ``due_s``."""
+
     due_s: float
     order: int
-    port: int = field(compare=False)
+    member: str = field(compare=False)
     datagram: bytes = field(compare=False)
 
 
-class EmulatedNet:
-    """One net on one loopback port; runs in a thread of its own between `start` and `close`."""
+class Air:
+    """A net in event time, s. ``silences_s``: (member, or "" for the whole net; from, until) when nothing passes.
 
-    def __init__(self, profile: NetProfile, member_ports: list[int], speed: float = 1.0) -> None:
+    Silences count from the exercise's zero, which stands at ``zero_s``; until that is set there are none.
+    """
+
+    def __init__(
+        self,
+        profile: NetProfile,
+        members: Sequence[str],
+        silences_s: Sequence[tuple[str, float, float]] = (),
+        zero_s: float = math.inf,
+    ) -> None:
         self.profile = profile
         self.counts = NetCounts()
-        self._members = member_ports
+        self.zero_s = zero_s
+        self._members = tuple(members)
+        self._silences_s = tuple(silences_s)
+        self._free_at_s = -math.inf
+        self._waiting: list[Delivery] = []
+        self._random = random.Random(profile.seed)
+
+    def transmit(self, sender: str, datagram: bytes, now_s: float) -> None:
+        """A member sends: the datagram takes its time on the air, then the others hear it or do not."""
+        size = len(datagram) + self.profile.header_bytes
+        self._free_at_s = max(self._free_at_s, now_s) + 8.0 * size / self.profile.rate_bits_per_s
+        due_s = self._free_at_s + self.profile.latency_s
+        self.counts.datagrams += 1
+        self.counts.bytes += size
+        deaf = self._silent(now_s)
+        for order, member in enumerate(self._members):
+            if member == sender:
+                continue
+            # Drawn for everybody, so that an outage does not shift what others lose afterwards.
+            missed = self._random.random() < self.profile.loss
+            if missed or not deaf.isdisjoint(("", sender, member)):
+                self.counts.lost += 1
+            else:
+                turn = self.counts.datagrams * len(self._members) + order
+                heapq.heappush(self._waiting, Delivery(due_s, turn, member, datagram))
+
+    def _silent(self, now_s: float) -> set[str]:
+        at_s = now_s - self.zero_s
+        return {who for who, begin, end in self._silences_s if begin <= at_s < end}
+
+    @property
+    def next_due_s(self) -> float:
+        """When the next datagram arrives; infinite if none is on its way."""
+        return self._waiting[0].due_s if self._waiting else math.inf
+
+    def arrived(self, now_s: float) -> list[Delivery]:
+        """The datagrams that have arrived by now, in order."""
+        found = []
+        while self._waiting and self._waiting[0].due_s <= now_s:
+            found.append(heapq.heappop(self._waiting))
+            self.counts.delivered += 1
+        return found
+
+
+class EmulatedNet:
+    """One net on one loopback port, for members by their UDP ports; a thread runs it from `start` to `close`."""
+
+    def __init__(
+        self,
+        profile: NetProfile,
+        member_ports: Mapping[str, int],
+        speed: float = 1.0,
+        silences_s: Sequence[tuple[str, float, float]] = (),
+    ) -> None:
+        self.profile = profile
+        self._air = Air(profile, list(member_ports), silences_s)
+        self._ports = dict(member_ports)
+        self._names = {port: name for name, port in member_ports.items()}
         self._speed = speed
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
         self._socket.setblocking(False)
         self.port: int = self._socket.getsockname()[1]
-        self._free_at_s = 0.0
-        self._waiting: list[_Delivery] = []
-        self._random = random.Random(profile.seed)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"radio net {profile.name}", daemon=True)
+
+    @property
+    def counts(self) -> NetCounts:
+        """What the air has carried so far."""
+        return self._air.counts
+
+    def begin(self, host_s: float) -> None:
+        """The exercise's zero comes in so many host seconds: from there on silences count."""
+        self._air.zero_s = self._now_s() + host_s * self._speed
 
     def start(self) -> None:
         """Put the net on the air."""
@@ -75,11 +151,15 @@ class EmulatedNet:
         self._thread.join(timeout=2.0)
         self._socket.close()
 
+    def _now_s(self) -> float:
+        """Event time, from some zero of its own."""
+        return time.monotonic() * self._speed
+
     def _run(self) -> None:
         with selectors.DefaultSelector() as selector:
             selector.register(self._socket, selectors.EVENT_READ)
             while not self._stop.is_set():
-                wait_s = self._waiting[0].due_s - time.monotonic() if self._waiting else _MAX_WAIT_S
+                wait_s = (self._air.next_due_s - self._now_s()) / self._speed
                 if selector.select(min(max(wait_s, 0.0), _MAX_WAIT_S)):
                     self._take_all()
                 self._deliver_due()
@@ -92,28 +172,12 @@ class EmulatedNet:
                 return
             except ConnectionError:  # a member's port was closed: radio does not care
                 continue
-            self._transmit(datagram, port)
-
-    def _transmit(self, datagram: bytes, sender_port: int) -> None:
-        size = len(datagram) + self.profile.header_bytes
-        airtime_s = 8.0 * size / self.profile.rate_bits_per_s
-        self._free_at_s = max(self._free_at_s, time.monotonic()) + airtime_s / self._speed
-        due_s = self._free_at_s + self.profile.latency_s / self._speed
-        self.counts.datagrams += 1
-        self.counts.bytes += size
-        for port in self._members:
-            if port == sender_port:
-                continue
-            if self._random.random() < self.profile.loss:
-                self.counts.lost += 1
-            else:
-                heapq.heappush(self._waiting, _Delivery(due_s, self.counts.datagrams, port, datagram))
+            self._air.transmit(self._names.get(port, ""), datagram, self._now_s())
 
     def _deliver_due(self) -> None:
-        while self._waiting and self._waiting[0].due_s <= time.monotonic():
-            delivery = heapq.heappop(self._waiting)
+        for delivery in self._air.arrived(self._now_s()):
             try:
-                self._socket.sendto(delivery.datagram, ("127.0.0.1", delivery.port))
-                self.counts.delivered += 1
+                self._socket.sendto(delivery.datagram, ("127.0.0.1", self._ports[delivery.member]))
             except (BlockingIOError, ConnectionError):
+                self.counts.delivered -= 1
                 self.counts.lost += 1

@@ -1,33 +1,35 @@
-"""What an exercise is: soldiers with their walks and truth, simulated or recorded; hubs, nets and faults."""
+"""What an exercise is: soldiers with what their sensors measured and the truth, computers, radio nets and faults.
 
+Times are seconds from the exercise's zero, places local ENU metres around its origin.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from pathlib import Path
+from typing import Any
 
-from bootprint.config import Origin
-from bootprint.errors import RecordingError
+import numpy as np
+import numpy.typing as npt
+
+from bootprint.clock import NS_PER_S
+from bootprint.config import Member, Origin, Realm
+from bootprint.topics import Identity
 from proving_ground.exercises.emulated_radio import NetProfile
-from proving_ground.sensors.run_writer import write_run_folder
-from proving_ground.simulation.walker import Gait, GnssQuality, simulate_walk
-from sensor_gateway.recordings import load_runs
 from sensor_gateway.recordings.run import Run, Truth
 
-REALM = "demo"
-UNIT = "alpha"
-LEADER = "a0"
-COMMAND_POST = "cp"
-SQUAD_SIZE = 4
-STOREY_M = 3.0
+FloatArray = npt.NDArray[np.float64]
+REALM = "exercise"
 ORIGIN = Origin(latitude_deg=59.35, longitude_deg=18.07, height_m=40.0)
-_CALLSIGNS = ("Adler", "Birke", "Cedar", "Delta")
-_SPACING_M = 8.0
-# Doorway headings of recorded walks are unknown: say east, and let the score fit the yaw.
-_RECORDED_START = {"azimuth_deg": 90.0, "azimuth_sigma_deg": 5.0}
+COMMAND_POST_ROLE = "command_post"
+_RELAYING_ROLES = ("squad_leader", "platoon_leader", "company_leader")
+_RELAY_WEIGHT = 3.0  # a relay tells of many, so its share of a net is that of so many soldiers
+_NET_SHARE = 0.8  # of a net's rate is given away: a frame that waits for the air is late
+_LEAST_BITS_PER_S = 30
 
 
 @dataclass(frozen=True)
 class Soldier:
-    """One instrumented soldier: who, which recording the gateway replays, the truth, and the given start."""
+    """One instrumented soldier: who, what the gateway plays, the truth, and the start that fusion is given."""
 
     id: str
     number: int
@@ -36,13 +38,8 @@ class Soldier:
     truth: Truth
     start: dict[str, float]
     simulated: bool
-    unit: str = UNIT
+    unit: str = "alpha"
     role: str = "rifleman"
-
-    @property
-    def sources(self) -> list[str]:
-        """Names of the inertial units and, if there is one, the receiver."""
-        return [*self.run.imus, *(["gnss"] if self.run.gnss is not None else [])]
 
 
 @dataclass(frozen=True)
@@ -58,11 +55,15 @@ class Hub:
 
 @dataclass(frozen=True)
 class Net:
-    """A radio net: what its air is like, the computers on it, and spans (from, until) s when it is down."""
+    """A radio net: what its air is like, the computers on it, and spans (from, until) s when it is down.
+
+    ``budget_bits_per_s`` is what each member may spend; None shares the net's rate out (`Exercise.budget`).
+    """
 
     profile: NetProfile
     members: tuple[str, ...]
     outages_s: tuple[tuple[float, float], ...] = ()
+    budget_bits_per_s: int | None = None
 
 
 @dataclass(frozen=True)
@@ -72,98 +73,122 @@ class Fault:
     at_s: float
     kind: str
     target: str
-    details: dict[str, str | float] = field(default_factory=dict)
+    details: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def until_s(self) -> float:
+        """When it is over; infinite if it lasts to the end."""
+        lasts_s = self.details.get("for_s")
+        return np.inf if lasts_s is None else self.at_s + float(lasts_s)
 
 
-_DEMO_HUBS = (
-    Hub(LEADER, 10, "Alpha", UNIT, "squad_leader"),
-    Hub(COMMAND_POST, 100, "Zero", "hq", "command_post"),
-)
+@dataclass(frozen=True)
+class Settings:
+    """What differs from the services' defaults on every computer: values of ``[hub]``, ``[pdr]``, ``[fusion]``."""
+
+    hub: Mapping[str, Any] = field(default_factory=dict)
+    pdr: Mapping[str, Any] = field(default_factory=dict)
+    fusion: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Exercise:
-    """Who takes part, with everything they measure; ``storeys_m`` are heights of the floors by level."""
+    """Who takes part, with everything they measure.
+
+    ``storeys_m`` are heights of the floors by level, ``plan`` outlines (k, 2) m on each of them, for maps.
+    """
 
     soldiers: tuple[Soldier, ...]
     origin: Origin = ORIGIN
-    name: str = "demo"
+    name: str = "exercise"
     begins: datetime = datetime(2026, 6, 1, 8, 0, tzinfo=UTC)
-    storeys_m: dict[int, float] = field(default_factory=lambda: {0: 0.0, 1: STOREY_M})
-    hubs: tuple[Hub, ...] = _DEMO_HUBS
+    storeys_m: dict[int, float] = field(default_factory=lambda: {0: 0.0})
+    hubs: tuple[Hub, ...] = ()
     nets: tuple[Net, ...] = ()
     faults: tuple[Fault, ...] = ()
+    settings: Settings = Settings()
+    plan: Mapping[int, Sequence[FloatArray]] = field(default_factory=dict)
 
     @property
     def duration_s(self) -> float:
         """Until the last walk has ended."""
         return max(soldier.run.duration_s for soldier in self.soldiers)
 
+    @property
+    def begins_ns(self) -> int:
+        """The exercise's zero, UTC ns; whole seconds, since radio decisions fall on a grid of event time."""
+        return round(self.begins.timestamp()) * NS_PER_S
 
-def _routes() -> list[list[tuple[float, float, float]]]:
-    """Four ways into and through a two-storey building whose south door is at (0, 0)."""
-    up = STOREY_M
-    return [
-        [(0, -12, 0), (0, 0, 0), (0, 6, 0), (18, 6, 0), (18, 16, 0), (4, 16, 0), (4, 7, 0), (14, 7, 0)],
-        [(-2, -14, 0), (-2, 6, 0), (-20, 6, 0), (-20, 18, 0), (-8, 18, 0), (-8, 8, 0), (-16, 8, 0)],
-        [(2, -16, 0), (2, 8, 0), (2, 13, up), (-12, 13, up), (-12, 20, up), (10, 20, up), (10, 12, up)],
-        [(4, -18, 0), (4, 8, 0), (4, 13, up), (20, 13, up), (20, 5, up), (8, 5, up), (8, 11, up)],
-    ]
+    @property
+    def participants(self) -> tuple[Soldier | Hub, ...]:
+        """Everybody with a computer: soldiers, then posts."""
+        return (*self.soldiers, *self.hubs)
 
+    @property
+    def computers(self) -> list[str]:
+        """The ids of all computers."""
+        return [one.id for one in self.participants]
 
-def simulated_exercise(folder: Path, seed: int = 1) -> Exercise:
-    """Four simulated walks through a building, GNSS until the door; written as run folders below ``folder``."""
-    soldiers = []
-    for index, route in enumerate(_routes()):
-        gait = Gait(step_length_m=0.66 + 0.03 * index, step_period_s=0.53 + 0.02 * index, stand_before_s=4.0)
-        to_the_door_s = gait.stand_before_s + 16.0
-        run = simulate_walk(
-            f"walk-{index + 1}",
-            route,
-            ORIGIN,
-            seed=seed * 1000 + index,
-            gait=gait,
-            gnss=GnssQuality(sigma_m=1.5, until_s=to_the_door_s),
+    @property
+    def command_post(self) -> str:
+        """Whose picture matters most: the first command post's, else the first post's, else the first soldier's."""
+        posts = [hub.id for hub in self.hubs if hub.role == COMMAND_POST_ROLE]
+        return next(iter([*posts, *(hub.id for hub in self.hubs), self.soldiers[0].id]))
+
+    @property
+    def realm(self) -> Realm:
+        """What all computers agree on."""
+        roster = tuple(
+            Member(id=one.id, number=one.number, unit=one.unit, callsign=one.callsign, role=one.role)
+            for one in self.participants
         )
-        write_run_folder(run, folder / run.name)
-        east_m, north_m, up_m = route[0]
-        start = {
-            "east_m": east_m,
-            "north_m": north_m,
-            "up_m": up_m,
-            "sigma_m": 0.5,
-            "azimuth_deg": 0.0,
-            "azimuth_sigma_deg": 2.0,
+        return Realm(id=REALM, origin=self.origin, roster=roster)
+
+    def identity(self, computer: str) -> Identity:
+        """The part of the key that a computer's topics share."""
+        return Identity(REALM, self.realm.member(computer).unit, computer)
+
+    @property
+    def floor_height_m(self) -> float | None:
+        """From floor to floor, None where there is one floor only (or none): what fusion divides heights by."""
+        heights = sorted(self.storeys_m.values())
+        return float(np.median(np.diff(heights))) if len(heights) > 1 else None
+
+    def floors(self, height_m: FloatArray) -> npt.NDArray[np.int64]:
+        """The level of the nearest floor (n,) at heights (n,)."""
+        levels = np.array(list(self.storeys_m), dtype=np.int64)
+        heights = np.array(list(self.storeys_m.values()))
+        return np.asarray(levels[np.argmin(np.abs(height_m[:, None] - heights), axis=1)], dtype=np.int64)
+
+    # -- radio ------------------------------------------------------------------------------------------------
+
+    def nets_of(self, computer: str) -> list[Net]:
+        """The nets that a computer is on."""
+        return [net for net in self.nets if computer in net.members]
+
+    def hub_role(self, computer: str) -> str:
+        """What a computer's hub is told to be: leaders relay, command posts too."""
+        role = self.realm.member(computer).role
+        if role == COMMAND_POST_ROLE:
+            return COMMAND_POST_ROLE
+        return "squad_leader" if role in _RELAYING_ROLES else "soldier"
+
+    def budget(self, net: Net, computer: str) -> int:
+        """What a computer may spend on a net, bit/s: its share of the net's rate, a relay's thrice a soldier's."""
+        if net.budget_bits_per_s is not None:
+            return net.budget_bits_per_s
+        weights = {
+            member: 1.0 if self.hub_role(member) == "soldier" else _RELAY_WEIGHT for member in net.members
         }
-        soldiers.append(_soldier(index, load_runs([folder / run.name])[0], run.truth["body"], start, True))
-    return Exercise(tuple(soldiers))
+        share = weights[computer] / sum(weights.values())
+        return max(_LEAST_BITS_PER_S, int(_NET_SHARE * share * net.profile.rate_bits_per_s))
 
-
-def recorded_exercise(data: Path) -> Exercise:
-    """Four soldiers who walk four recorded foot walks with truth: those of a folder, or of its ``foot-gcp``."""
-    folder = data / "foot-gcp" if (data / "foot-gcp").is_dir() else data
-    runs = [run for run in load_runs([folder]) if run.truth and run.kind in ("foot", "dual")]
-    if len(runs) < SQUAD_SIZE:
-        raise RecordingError(f"{folder}: has {len(runs)} foot walks with truth, the demo wants {SQUAD_SIZE}")
-    return Exercise(
-        tuple(
-            _soldier(
-                index,
-                run,
-                next(iter(run.truth.values())),
-                {
-                    "east_m": _SPACING_M * index,
-                    "north_m": 0.0,
-                    "up_m": 0.0,
-                    "sigma_m": 0.5,
-                    **_RECORDED_START,
-                },
-                simulated=False,
-            )
-            for index, run in enumerate(runs[:SQUAD_SIZE])
-        )
-    )
-
-
-def _soldier(index: int, run: Run, truth: Truth, start: dict[str, float], simulated: bool) -> Soldier:
-    return Soldier(f"a{index + 1}", index + 1, _CALLSIGNS[index], run, truth, start, simulated)
+    def silences_s(self, net: Net) -> list[tuple[str, float, float]]:
+        """When nobody (``""``) or one member is heard on a net: (member, from, until) of outages and faults."""
+        down = [("", begin, end) for begin, end in net.outages_s]
+        for fault in self.faults:
+            if fault.kind == "radio_gone" and fault.target == net.profile.name:
+                down.append(("", fault.at_s, fault.until_s))
+            elif fault.kind == "radio_gone" and fault.target in net.members:
+                down.append((fault.target, fault.at_s, fault.until_s))
+        return sorted(down, key=lambda silence: (silence[1], silence[0]))

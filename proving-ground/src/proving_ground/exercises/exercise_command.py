@@ -2,11 +2,15 @@
 
 import typer
 
-from proving_ground.exercises import scenario_command
+from proving_ground.exercises import run_command, scenario_command
 
 
 def register(app: typer.Typer) -> None:
     """Add the group."""
-    group = typer.Typer(no_args_is_help=True, help="Simulated exercises: what there is, what it looks like.")
+    group = typer.Typer(
+        no_args_is_help=True,
+        help="Simulated exercises: what there is, what it looks like; play, compare, repeat.",
+    )
     scenario_command.add_to(group)
+    run_command.add_to(group)
     app.add_typer(group, name="exercise")

@@ -1,53 +1,48 @@
-"""The files an exercise's processes read: realm.toml, the group key, and a computer.toml for each computer."""
+"""What an exercise's computers are told: realm.toml, the group key, a computer.toml each; also as structs."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from bootprint.clock import NS_PER_S
-from proving_ground.exercises.exercise import COMMAND_POST, LEADER, REALM, STOREY_M, UNIT, Exercise, Soldier
+from bootprint.config import convert
+from fusion.config import FusionConfig
+from pdr_engine.config import PdrConfig
+from proving_ground.exercises.exercise import Exercise, Soldier
 from sa_hub.keys import create_group_key
+from sa_hub.settings import HubSettings, check_settings
 
-_LINK_BITS_PER_S = 1200  # what each hub may spend on a net
-_UDP_HEADER_BYTES = 28
-_ROLES = {LEADER: "squad_leader", COMMAND_POST: "command_post"}
+_WHERE = "exercise"
 
 
 @dataclass(frozen=True)
 class Ports:
     """UDP ports of loopback: each net's members by computer, and the net's own by name."""
 
-    members: dict[str, dict[str, int]]
-    nets: dict[str, int]
+    members: dict[str, dict[str, int]] = field(default_factory=dict)
+    nets: dict[str, int] = field(default_factory=dict)
 
 
 def write_realm(folder: Path, exercise: Exercise) -> None:
     """``realm.toml`` (origin and roster) and the group key, made once."""
     if not (folder / "keys" / "group.key").exists():
         create_group_key(folder / "keys" / "group.key")
-    origin = exercise.origin
-    roster: list[dict[str, Any]] = [
-        {"id": soldier.id, "number": soldier.number, "unit": UNIT, "callsign": soldier.callsign}
-        for soldier in exercise.soldiers
-    ]
-    roster.append({"id": LEADER, "number": 10, "unit": UNIT, "callsign": "Alpha", "role": "squad_leader"})
-    roster.append(
-        {"id": COMMAND_POST, "number": 100, "unit": "hq", "callsign": "Zero", "role": "command_post"}
-    )
+    realm = exercise.realm
     write_toml(
         folder / "realm.toml",
         {
-            "id": REALM,
-            "origin": {
-                "latitude_deg": origin.latitude_deg,
-                "longitude_deg": origin.longitude_deg,
-                "height_m": origin.height_m,
-            },
-            "roster": roster,
+            "id": realm.id,
+            "origin": _fields(realm.origin),
+            "roster": [_fields(member) for member in realm.roster],
         },
     )
+
+
+def _fields(struct: Any) -> dict[str, Any]:
+    return {name: getattr(struct, name) for name in struct.__struct_fields__}
 
 
 def write_computer(folder: Path, exercise: Exercise, computer: str, router: str, ports: Ports) -> None:
@@ -57,15 +52,17 @@ def write_computer(folder: Path, exercise: Exercise, computer: str, router: str,
         folder / computer / "computer.toml",
         {
             **_common(computer, router),
-            **_sections(soldiers.get(computer)),
-            "hub": _hub(computer, ports),
+            **(sections(exercise, soldiers[computer]) if computer in soldiers else {}),
+            "hub": hub_section(exercise, computer, ports),
         },
     )
 
 
-def write_gateway(folder: Path, soldier: Soldier, router: str, start_ns: int) -> None:
-    """The gateway's own ``gateway.toml``: known only when the start of the walks is."""
-    source = {
+def write_gateway(
+    folder: Path, soldier: Soldier, router: str, start_ns: int, serial: Mapping[str, Any] | None = None
+) -> None:
+    """The gateway's own ``gateway.toml``: a replay that starts when the walks do, or a serial port."""
+    replay = {
         "kind": "replay",
         "path": str(soldier.run.path.resolve()),
         "run": soldier.run.name,
@@ -73,7 +70,7 @@ def write_gateway(folder: Path, soldier: Soldier, router: str, start_ns: int) ->
     }
     write_toml(
         folder / soldier.id / "gateway.toml",
-        {**_common(soldier.id, router), "gateway": {"sources": [source]}},
+        {**_common(soldier.id, router), "gateway": {"sources": [dict(serial or replay)]}},
     )
 
 
@@ -87,38 +84,59 @@ def _common(computer: str, router: str) -> dict[str, Any]:
     return {"realm": "../realm.toml", "soldier": computer, "router": router, "keys_dir": "../keys"}
 
 
-def _sections(soldier: Soldier | None) -> dict[str, Any]:
-    if soldier is None:
-        return {}
+def sections(exercise: Exercise, soldier: Soldier) -> dict[str, dict[str, Any]]:
+    """``[pdr]`` and ``[fusion]`` of a soldier's computer."""
+    feet = [place for place in soldier.run.imus if place.endswith("_foot")]
+    fusion: dict[str, Any] = {
+        "feet": feet,
+        "gnss_sources": ["gnss"] if soldier.run.gnss is not None else [],
+        "start": soldier.start,
+    }
+    if exercise.floor_height_m is not None:
+        fusion["floor_height_m"] = exercise.floor_height_m
     return {
-        "pdr": {"places": list(soldier.run.imus)},
-        "fusion": {
-            "feet": list(soldier.run.imus),
-            "gnss_sources": ["gnss"] if soldier.run.gnss is not None else [],
-            "floor_height_m": STOREY_M,
-            "start": soldier.start,
-        },
+        "pdr": {"places": list(soldier.run.imus), **exercise.settings.pdr},
+        "fusion": fusion | dict(exercise.settings.fusion),
     }
 
 
-def _hub(computer: str, ports: Ports) -> dict[str, Any]:
-    """The hub's section: a link on every net that this computer is on."""
-    return {
-        "role": _ROLES.get(computer, "soldier"),
-        "exercise": True,
-        "threshold_m": 3.0,
-        "heartbeat_s": 10.0,
-        "stale_s": 20.0,
-        "lost_s": 60.0,
-        "links": [
-            {
-                "name": net,
-                "bind": f"127.0.0.1:{members[computer]}",
-                "peers": [f"127.0.0.1:{ports.nets[net]}"],
-                "rate_bits_per_s": _LINK_BITS_PER_S,
-                "header_bytes": _UDP_HEADER_BYTES,
-            }
-            for net, members in ports.members.items()
-            if computer in members
-        ],
-    }
+def hub_section(exercise: Exercise, computer: str, ports: Ports | None = None) -> dict[str, Any]:
+    """``[hub]`` of a computer: a link on every net that it is on, with addresses where there are any."""
+    links = []
+    for net in exercise.nets_of(computer):
+        name = net.profile.name
+        link: dict[str, Any] = {
+            "name": name,
+            "rate_bits_per_s": exercise.budget(net, computer),
+            "header_bytes": net.profile.header_bytes,
+        }
+        if ports is not None:
+            link["bind"] = f"127.0.0.1:{ports.members[name][computer]}"
+            link["peers"] = [f"127.0.0.1:{ports.nets[name]}"]
+        links.append(link)
+    return {"role": exercise.hub_role(computer), "exercise": True, **exercise.settings.hub, "links": links}
+
+
+def hub_settings(exercise: Exercise, computer: str) -> HubSettings:
+    """The same, checked; ConfigError if it does not fit together."""
+    where = f"{_WHERE}: [hub]"
+    settings = convert(hub_section(exercise, computer), HubSettings, where)
+    check_settings(settings, where)
+    return settings
+
+
+def soldier_settings(exercise: Exercise, soldier: Soldier) -> tuple[PdrConfig, FusionConfig]:
+    """``[pdr]`` and ``[fusion]``, checked."""
+    values = sections(exercise, soldier)
+    return (
+        convert(values["pdr"], PdrConfig, f"{_WHERE}: [pdr]"),
+        convert(values["fusion"], FusionConfig, f"{_WHERE}: [fusion]"),
+    )
+
+
+def check_exercise(exercise: Exercise) -> None:
+    """ConfigError now rather than in a process's log if a computer's settings are wrong."""
+    for computer in exercise.computers:
+        hub_settings(exercise, computer)
+    for soldier in exercise.soldiers:
+        soldier_settings(exercise, soldier)

@@ -1,98 +1,119 @@
-"""Watches an exercise from outside: one bus client per computer that keeps what the score needs.
+"""Watches an exercise from outside: a bus client per computer, all of them emptied by one thread.
 
-The observer is the umpire: it sees every computer's bus, which no computer of the exercise does.
+The observers are the umpire: they see every computer's bus, which no computer of the exercise does.
 """
 
 import threading
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 
 from bootprint.bus import Envelope
 from bootprint.clock import EventClock
-from bootprint.messages import Health, LinkReport, Mode, Position, Track
+from bootprint.geodesy import LocalFrame
+from bootprint.messages import Mode, Position, Track
+from bootprint.recording import Recorder
 from bootprint.topics import VERSION
-from bootprint.zenoh_bus import ZenohBus, open_bus
+from bootprint.zenoh_bus import Inlet, ZenohBus, open_bus
+from proving_ground.exercises.heard import WATCHED, Heard
 
 _SENSED: tuple[Mode, ...] = ("gnss", "boots", "body", "camera")  # modes with a sensor behind the position
-WATCHED = ("position", "track", "link", "health")
+_INTERVAL_S = 0.02  # host time between two looks: what latencies are too long by, at the most
+_FLUSH_LOOKS = 50
 
 
-@dataclass
-class Heard:
-    """What one computer's bus has told so far.
+class Observers:
+    """Collect from every computer's bus (by its router) until closed; with a recorder, everything is recorded."""
 
-    ``tracks`` holds (event time of arrival ns, track); ``latency_s`` is host time from a position's event time to
-    its publication as the soldier's own track.
-    """
-
-    positions: list[Position] = field(default_factory=list)
-    tracks: list[tuple[int, Track]] = field(default_factory=list)
-    links: dict[str, LinkReport] = field(default_factory=dict)
-    health: dict[str, Health] = field(default_factory=dict)
-    latency_s: list[float] = field(default_factory=list)
-
-
-class Observer:
-    """Collects from one computer's bus until closed."""
-
-    def __init__(self, computer: str, router: str, realm: str, clock: EventClock) -> None:
-        self.computer = computer
+    def __init__(
+        self,
+        routers: Mapping[str, str],
+        realm: str,
+        clock: EventClock,
+        frame: LocalFrame,
+        recorder: Recorder | None = None,
+    ) -> None:
         self._clock = clock
+        self._frame = frame
+        self._recorder = recorder
         self._lock = threading.Lock()
-        self._heard = Heard()
-        self._newest: dict[str, Track] = {}
-        self._realm = realm
-        self._bus: ZenohBus = open_bus(router)
+        self._heard = {computer: Heard() for computer in routers}
+        self._buses: dict[str, ZenohBus] = {}
+        self._inlets: list[tuple[str, Inlet]] = []
+        self._recorded: list[Inlet] = []
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="observers", daemon=True)
+        for computer, router in routers.items():
+            self._open(computer, router, f"{realm}/{VERSION}")
+        self._thread.start()
+
+    def _open(self, computer: str, router: str, root: str) -> None:
+        bus = self._buses[computer] = open_bus(router)
         for subject in WATCHED:
-            self._bus.subscribe(f"{realm}/{VERSION}/*/*/{subject}/*", self._take)
+            self._inlets.append((computer, bus.open_inlet(f"{root}/*/*/{subject}/*")))
+        if self._recorder is not None:
+            self._recorded.append(bus.open_inlet(f"{root}/**"))
 
-    def alive(self) -> set[str]:
-        """Names of the services that hold their liveliness token on this computer."""
-        return {key.rsplit("/", 1)[1] for key in self._bus.alive(f"{self._realm}/{VERSION}/*/*/health/*")}
+    def _run(self) -> None:
+        looks = 0
+        while not self._stop.wait(_INTERVAL_S):
+            looks += 1
+            self._look()
+            if self._recorder is not None and looks % _FLUSH_LOOKS == 0:
+                self._recorder.flush()
 
-    def _take(self, envelope: Envelope) -> None:
+    def _look(self) -> None:
+        now_ns = self._clock.now_ns()
+        for computer, inlet in self._inlets:
+            for envelope in inlet.take():
+                self._take(computer, envelope, now_ns)
+        if self._recorder is not None:
+            for inlet in self._recorded:
+                for envelope in inlet.take():
+                    self._recorder.write(envelope, now_ns)
+
+    def _take(self, computer: str, envelope: Envelope, now_ns: int) -> None:
+        message = envelope.message
+        arrived_ns = now_ns
+        if isinstance(message, Track) and message.received_ns is not None:
+            arrived_ns = message.received_ns  # when the hub had it, not when we looked
         with self._lock:
-            match envelope.message:
-                case Position() as position:
-                    self._heard.positions.append(position)
-                case Track() as track:
-                    self._take_track(track)
-                case LinkReport() as report:
-                    self._heard.links[report.link] = report
-                case Health() as health:
-                    self._heard.health[health.service] = health
+            heard = self._heard[computer]
+            is_own = heard.take(envelope, arrived_ns, self._frame)
+            if is_own and isinstance(message, Track) and message.mode in _SENSED:
+                latency_s = self._clock.host_seconds_since(message.time_ns)
+                heard.latency_s += [] if latency_s is None else [latency_s]
 
-    def _take_track(self, track: Track) -> None:
-        previous = self._newest.get(track.soldier)
-        if previous is not None and track.time_ns <= previous.time_ns:
-            return  # the same report published again, with a new state
-        self._newest[track.soldier] = track
-        self._heard.tracks.append((self._clock.now_ns(), track))
-        latency_s = self._clock.host_seconds_since(track.time_ns)
-        if track.soldier == self.computer and track.mode in _SENSED and latency_s is not None:
-            self._heard.latency_s.append(latency_s)
-
-    def newest_tracks(self) -> dict[str, Track]:
-        """The newest track of every soldier known on this computer."""
+    def alive(self, computer: str) -> set[str]:
+        """Names of the services that run on a computer, by what they say of their health."""
         with self._lock:
-            return dict(self._newest)
+            return self._heard[computer].alive()
 
-    def newest_position(self) -> Position | None:
-        """The newest fused position on this computer."""
+    def forget(self, computer: str, service: str) -> None:
+        """A service was killed, or will be started again: it is not alive until it says so."""
         with self._lock:
-            return self._heard.positions[-1] if self._heard.positions else None
+            self._heard[computer].health.pop(service, None)
 
-    def heard(self) -> Heard:
-        """A copy of all that was heard."""
+    def newest_tracks(self, computer: str) -> dict[str, Track]:
+        """The newest track of every soldier known on a computer."""
         with self._lock:
-            heard = self._heard
-            return Heard(
-                list(heard.positions),
-                list(heard.tracks),
-                dict(heard.links),
-                dict(heard.health),
-                list(heard.latency_s),
-            )
+            return dict(self._heard[computer].newest)
+
+    def newest_position(self, computer: str) -> Position | None:
+        """The newest fused position on a computer."""
+        with self._lock:
+            positions = self._heard[computer].positions
+            return positions[-1] if positions else None
+
+    def heard(self) -> dict[str, Heard]:
+        """All that has been heard, by computer; to be read when the exercise is over (`close`)."""
+        with self._lock:
+            return dict(self._heard)
 
     def close(self) -> None:
-        """Stop watching."""
-        self._bus.close()
+        """Take in what waits, then stop watching; safe to call twice."""
+        if self._stop.is_set():
+            return
+        self._stop.set()
+        self._thread.join()
+        self._look()
+        for bus in self._buses.values():
+            bus.close()

@@ -68,6 +68,15 @@ class ProcessGroup:
         if lines := self.failed():
             raise ProcessError("; ".join(lines))
 
+    def kill(self, name: str) -> None:
+        """One process is gone without warning, and nobody is to wonder; nothing if it does not run."""
+        _, process = self._running.pop(name, (None, None))
+        if process is not None:
+            process.kill()
+            process.wait()
+            if process.stdin:
+                process.stdin.close()
+
     def stop(self, names: Collection[str] | None = None) -> None:
         """End all (or those named): close their input, then terminate, then kill; returns when none is left."""
         ended = [name for name in self._running if names is None or name in names]

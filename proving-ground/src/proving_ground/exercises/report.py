@@ -1,126 +1,164 @@
-"""What people read after an exercise: a score table on the terminal, ``result.json`` and ``report.html``."""
+"""What people read after an exercise: ``result.json``, and ``report.html`` that needs no other file."""
 
-import base64
 import html
-import io
 import json
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
+import numpy as np
 
-from proving_ground.exercises.exercise import Exercise
-from proving_ground.exercises.result import Result
+from proving_ground.exercises.picture import FALSE_M
+from proving_ground.exercises.plots import Plot, plots_of
+from proving_ground.exercises.result import Result, ages_of
+from proving_ground.exercises.tables import TABLES, html_table, summary
+from proving_ground.exercises.usage import by_service
 
-_TABLES = (
-    ("soldiers", "Positions at the soldiers, against truth"),
-    ("pictures", "Pictures at the receivers"),
-    ("links", "Radio links, link headers included"),
-)
-_UNITS = {"_bits_per_s": "bit/s", "bits_per_s": "bit/s", "_m": "m", "_s": "s", "_pct": "%", "_ms": "ms"}
-_FILE_WIDTH = 160
+_MANY_ROWS = 20
 _STYLE = """
-body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem}
-body{color:#1b1f23;background:#fff}
-table{border-collapse:collapse;margin:1rem 0}td,th{padding:.25rem .8rem;border-bottom:1px solid #d0d7de}
-th{text-align:left;font-weight:600}td{text-align:right;font-variant-numeric:tabular-nums}
-td:first-child{text-align:left}
-img{max-width:100%}
+:root{--ink:#1b1f23;--faint:#57606a;--line:#d0d7de;--blue:#0b6bcb}
+body{font:15px/1.55 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 1.2rem}
+body{color:var(--ink);background:#fff}
+h1{font-size:1.7rem;margin:0}h2{font-size:1.2rem;margin:2.2rem 0 .4rem}
+p.note,figcaption{color:var(--faint);max-width:60rem}
+.sub{color:var(--faint);margin:.2rem 0 1.4rem}
+.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(13rem,1fr));gap:.8rem;margin:1rem 0}
+.card{border:1px solid var(--line);border-radius:8px;padding:.7rem .9rem}
+.card b{display:block;font-size:1.5rem;font-variant-numeric:tabular-nums}
+.card span{color:var(--faint);font-size:.87rem}
+.wide{overflow-x:auto}table{border-collapse:collapse;margin:.6rem 0;font-size:.9rem}
+td,th{padding:.22rem .7rem;border-bottom:1px solid var(--line)}
+th{text-align:left;font-weight:600;vertical-align:bottom}
+td{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}td:first-child{text-align:left}
+figure{margin:1rem 0}figure svg{max-width:100%;height:auto}
+.log td{text-align:left}.log td:first-child{text-align:right}details{margin:.4rem 0}
+summary{cursor:pointer;color:var(--blue)}
 """
 
 
-def print_scores(result: Result) -> None:
-    """The score tables on standard output."""
-    console = Console()
-    if not console.is_terminal:
-        console.width = _FILE_WIDTH  # a file or a pipe has no columns to save
-    for key, title in _TABLES:
-        rows = result.figures[key]
-        table = Table(title=title, title_justify="left")
-        for column in rows[0] if rows else ():
-            table.add_column(_title(column), justify="left" if column == next(iter(rows[0])) else "right")
-        for row in rows:
-            table.add_row(*(_cell(value) for value in row.values()))
-        console.print(table)
-    console.print(f"latency sensor to track, p99: {_cell(result.figures['latency_p99_ms'])} ms")
-
-
-def write_report(folder: Path, exercise: Exercise, result: Result) -> None:
+def write_report(folder: Path, result: Result) -> None:
     """Write ``result.json`` and ``report.html`` into the folder."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "result.json").write_text(json.dumps(result.figures, indent=2) + "\n", encoding="utf-8")
-    (folder / "report.html").write_text(_page(exercise, result), encoding="utf-8")
+    (folder / "report.html").write_text(_page(result), encoding="utf-8")
 
 
-def _title(column: str) -> str:
-    """A column's name for people: the unit after its words, which may break between lines."""
-    for suffix, unit in _UNITS.items():
-        if column.endswith(suffix):
-            return f"{column.removesuffix(suffix).replace('_', ' ')} {unit}"
-    return column.replace("_", " ")
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return "–"
-    return f"{value:.2f}" if isinstance(value, float) else str(value)
-
-
-def _page(exercise: Exercise, result: Result) -> str:
-    sources = sorted({soldier.run.source for soldier in exercise.soldiers if soldier.run.source})
-    tables = "".join(f"<h2>{title}</h2>{_html_table(result.figures[key])}" for key, title in _TABLES)
+def _page(result: Result) -> str:
+    name = html.escape(result.figures["exercise"])
     return (
-        "<!doctype html><html lang=en><meta charset=utf-8><title>bootprint: exercise report</title>"
-        f"<style>{_STYLE}</style><h1>Exercise report: {html.escape(result.figures['exercise'])}</h1>"
-        f"<p>{result.figures['duration_s']:.0f} s of exercise time at {result.figures['speed']:g}x, "
-        f"{result.figures['processes']} processes. Walks: {html.escape('; '.join(sources))}.</p>"
-        f"{_map(result)}{tables}"
-        f"<p>Latency sensor to track, 99th percentile: {_cell(result.figures['latency_p99_ms'])} ms.</p></html>\n"
+        '<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content="width=device-width">'
+        f"<title>bootprint: {name}</title><style>{_STYLE}</style><h1>Exercise report: {name}</h1>"
+        f"<p class=sub>{_circumstances(result)}</p>{_cards(result)}"
+        f"{''.join(_figure(plot) for plot in plots_of(result))}"
+        f"{_tables(result)}{_usage(result)}{_log(result)}{_glossary(result)}</html>\n"
     )
 
 
-def _html_table(rows: list[dict[str, Any]]) -> str:
+def _circumstances(result: Result) -> str:
+    figures, exercise = result.figures, result.played.exercise
+    sources = sorted({soldier.run.source for soldier in exercise.soldiers if soldier.run.source})
+    how = "in one process, in event time"
+    if figures["mode"] == "processes":
+        how = f"{figures['processes']} processes at {figures['speed']:g} times real time"
+    return html.escape(
+        f"{len(exercise.soldiers)} soldiers, {len(exercise.hubs)} posts, {len(exercise.nets)} radio nets; "
+        f"{figures['duration_s']:.0f} s; {how}. Walks: {'; '.join(sources) or 'unnamed'}."
+    )
+
+
+def _cards(result: Result) -> str:
+    figures = result.figures
+    post = figures["pictures"][0] if figures["pictures"] else {}
+    receiver = result.played.exercise.command_post
+    cards = [
+        (
+            _median(figures["soldiers"], "dead_reckoning_error_p95_m"),
+            "m",
+            "foot steps alone, 95 % of the time",
+        ),
+        (_median(figures["soldiers"], "position_error_p95_m"), "m", "fused position, 95 % of the time"),
+        (_median(figures["soldiers"], "inside_95_pct"), "%", "of truths inside the 95 % ellipse"),
+        (_median(figures["soldiers"], "floor_correct_pct"), "%", "of the time on the right floor"),
+        (post.get("picture_error_p95_m"), "m", f"picture at {receiver}, 95 % of the time"),
+        (post.get("age_p95_s"), "s", f"age of what {receiver} knows, 95 % of the time"),
+        (post.get("missing_pct"), "%", f"of everybody missing at {receiver}"),
+        (figures.get("latency_p99_ms"), "ms", "from sensor to own track, 99 % of the time"),
+    ]
+    shown = "".join(
+        f"<div class=card><b>{_short(value)} {unit}</b><span>{html.escape(words)}</span></div>"
+        for value, unit, words in cards
+        if value is not None
+    )
+    return f"<div class=cards>{shown}</div><p class=note>Of soldiers the median is shown.</p>"
+
+
+def _short(value: float) -> str:
+    return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.2g}" if abs(value) < 1.0 else f"{value:.1f}"
+
+
+def _median(rows: list[dict[str, Any]], column: str) -> float | None:
+    values = [row[column] for row in rows if row[column] is not None]
+    return float(np.median(values)) if values else None
+
+
+def _figure(plot: Plot) -> str:
+    return (
+        f"<h2>{html.escape(plot.title)}</h2><figure>{plot.svg}"
+        f"<figcaption>{html.escape(plot.caption)}</figcaption></figure>"
+    )
+
+
+def _tables(result: Result) -> str:
+    return "".join(_table(title, result.figures[key]) for key, title in TABLES)
+
+
+def _table(title: str, rows: list[dict[str, Any]]) -> str:
+    head = f"<h2>{html.escape(title)}</h2>"
+    if len(rows) <= _MANY_ROWS:
+        return head + html_table(rows)
+    return (
+        f"{head}{html_table(summary(rows))}<details><summary>all {len(rows)} rows</summary>"
+        f"{html_table(rows)}</details>"
+    )
+
+
+def _usage(result: Result) -> str:
+    rows = result.figures.get("usage")
     if not rows:
-        return "<p>None.</p>"
-    head = "".join(f"<th>{html.escape(_title(column))}</th>" for column in rows[0])
-    body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(_cell(v))}</td>" for v in row.values()) + "</tr>" for row in rows
+        return ""
+    return (
+        f"<h2>Processes</h2>{html_table(by_service(rows))}"
+        "<p class=note>Per cent of one processor while the exercise ran; memory is the proportional share (PSS). "
+        "The umpire is the exercise itself: all computers' routers, the emulated nets and the observers.</p>"
+        f"<details><summary>every process</summary>{html_table(rows)}</details>"
     )
-    return f"<table><tr>{head}</tr>{body}</table>"
 
 
-def _map(result: Result) -> str:
-    """Fused tracks over truth, one panel a soldier, as an embedded picture."""
-    if not result.compared:
-        return "<p>No position was heard.</p>"
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(
-        1, len(result.compared), figsize=(4.2 * len(result.compared), 4.4), squeeze=False
+def _log(result: Result) -> str:
+    if not result.events:
+        return "<h2>Event log</h2><p>Nothing befell anybody.</p>"
+    rows = "".join(
+        f"<tr><td>{_clock(event.time_s)}</td><td>{html.escape(event.who)}</td><td>{html.escape(event.what)}</td></tr>"
+        for event in result.events
     )
-    for axis, (name, compared) in zip(axes[0], result.compared.items(), strict=True):
-        truth, fused = compared.soldier.truth.position_m, compared.to_truth(compared.track.enu_m[:, :2])
-        axis.plot(truth[:, 0], truth[:, 1], color="#9aa4ae", linewidth=3, label="truth")
-        axis.plot(fused[:, 0], fused[:, 1], color="#0b6bcb", linewidth=1.2, label="fused")
-        told = compared.to_truth(result.reports_m[name])
-        axis.plot(
-            told[:, 0], told[:, 1], "x", color="#e36209", markersize=5, label="told to the command post"
-        )
-        axis.plot(*fused[0], "o", color="#1a7f37", label="start")
-        axis.plot(*fused[-1], "s", color="#cf222e", label="end")
-        axis.set(
-            title=f"{compared.soldier.callsign} ({name}): {compared.soldier.run.name}", xlabel="m", ylabel="m"
-        )
-        axis.set_aspect("equal", adjustable="datalim")
-        axis.grid(alpha=0.3)
-    axes[0][0].legend(fontsize=8)
-    figure.tight_layout()
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=110)
-    plt.close(figure)
-    encoded = base64.b64encode(picture.getvalue()).decode("ascii")
-    return f'<p><img alt="Fused tracks over truth" src="data:image/png;base64,{encoded}"></p>'
+    table = f"<table class=log><tbody>{rows}</tbody></table>"
+    if len(result.events) > 2 * _MANY_ROWS:
+        table = f"<details><summary>{len(result.events)} events</summary>{table}</details>"
+    return f"<h2>Event log</h2>{table}"
+
+
+def _clock(time_s: float) -> str:
+    return f"{int(time_s) // 60}:{time_s % 60:04.1f}"
+
+
+def _glossary(result: Result) -> str:
+    ages = ages_of(result.played.exercise)
+    return (
+        "<h2>What the words mean</h2><p class=note>"
+        "<b>Dead reckoning</b>: each foot's steps chained, laid over the truth by the best turn and shift; mean of "
+        "both feet. <b>Fused</b>: what the soldier's own computer says. <b>Picture</b>: where a receiver believes "
+        "somebody to be, moved on at constant velocity since the newest report; <b>added</b> is its distance from "
+        "what the sender's fusion said. <b>Missing</b>: nothing known, or older than "
+        f"{ages.lost_s:g} s. <b>False</b>: shown as fresh (younger than {ages.stale_s:g} s) and more than "
+        f"{FALSE_M:g} m from the truth. "
+        "<b>Lost</b> frames are those that a receiver should have heard.</p>"
+    )

@@ -1,85 +1,92 @@
-"""The result object of a demo or exercise: every figure of DESIGN, and the tracks a report draws."""
+"""The result object of an exercise: every figure of DESIGN at every hop, and what a report draws."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
 
-from proving_ground.exercises.exercise import COMMAND_POST, Exercise
-from proving_ground.exercises.score import (
-    Compared,
-    FloatArray,
-    Row,
-    compare,
-    latency_p99_ms,
-    link_row,
-    picture_row,
-    reported_places,
-    sample_picture,
-    soldier_row,
-)
+from proving_ground.exercises.dead_reckoning import dead_reckoning_row
+from proving_ground.exercises.emulated_radio import NetCounts
+from proving_ground.exercises.events import Event, event_log
+from proving_ground.exercises.exercise import Exercise
+from proving_ground.exercises.exercise_files import hub_settings
+from proving_ground.exercises.heard import Heard
+from proving_ground.exercises.picture import Ages, Picture, picture_row, sample_picture
+from proving_ground.exercises.score import Compared, Row, compare, link_row, soldier_row
 
-if TYPE_CHECKING:
-    from proving_ground.exercises.stage import Stage
+
+@dataclass(frozen=True)
+class Played:
+    """What an exercise left behind, whichever way it was played: ``start_ns`` is its zero, UTC ns."""
+
+    exercise: Exercise
+    start_ns: int
+    duration_s: float
+    heard: Mapping[str, Heard]
+    nets: Mapping[str, NetCounts]
 
 
 @dataclass(frozen=True)
 class Result:
-    """``figures`` is what ``result.json`` holds; ``compared`` and ``reports_m`` feed the report's map.
-
-    ``reports_m``: the places (n, 2) at which the command post was told each soldier to be.
-    """
+    """``figures`` is what ``result.json`` holds; the rest feeds the report's plots."""
 
     figures: dict[str, Any]
+    played: Played
     compared: dict[str, Compared]
-    reports_m: dict[str, FloatArray]
+    pictures: dict[str, Picture]
+    events: list[Event]
 
 
-def result_of(stage: "Stage") -> Result:
-    """Score what the stage's observers have heard."""
-    heard = {computer: observer.heard() for computer, observer in stage.observers.items()}
-    compared = {
-        soldier.id: compare(soldier, heard[soldier.id].positions, stage.start_ns)
-        for soldier in stage.exercise.soldiers
+def result_of(played: Played, extra: Mapping[str, Any] | None = None) -> Result:
+    """Score what was heard; ``extra`` figures belong to the way it was played."""
+    exercise, heard = played.exercise, played.heard
+    found = {
+        soldier.id: compare(soldier, heard[soldier.id].positions, played.start_ns)
+        for soldier in exercise.soldiers
     }
-    squad = {name: each for name, each in compared.items() if each is not None}
-    duration_s = max(stage.elapsed_s, 1e-9)
-    return Result(
-        figures={
-            "exercise": _name(stage.exercise),
-            "duration_s": duration_s,
-            "speed": stage.speed,
-            "processes": len(stage.processes.pids),
-            "soldiers": [soldier_row(s, compared[s.id]) for s in stage.exercise.soldiers],
-            "pictures": [
-                picture_row(
-                    receiver,
-                    sample_picture(
-                        heard[receiver].tracks,
-                        [each for name, each in squad.items() if name != receiver],
-                        stage.start_ns,
-                        stage.frame,
-                    ),
-                )
-                for receiver in sorted(stage.computers, key=lambda name: name != COMMAND_POST)
-            ],
-            "links": _links(stage, duration_s),
-            "nets": [
-                {"net": name, **net.counts.__dict__, "bits_per_s": 8.0 * net.counts.bytes / duration_s}
-                for name, net in stage.nets.items()
-            ],
-            "latency_p99_ms": latency_p99_ms(list(heard.values())),
-        },
-        compared=squad,
-        reports_m={name: reported_places(heard[COMMAND_POST].tracks, name, stage.frame) for name in squad},
-    )
+    compared = {name: each for name, each in found.items() if each is not None}
+    ages = ages_of(exercise)
+    pictures = {receiver: _picture(played, receiver, compared) for receiver in _receivers(exercise)}
+    events = event_log(exercise, heard, played.start_ns, ages.lost_s, played.duration_s)
+    figures = {
+        "exercise": exercise.name,
+        "duration_s": played.duration_s,
+        **(extra or {}),
+        "soldiers": [
+            soldier_row(soldier, found[soldier.id], exercise)
+            | dead_reckoning_row(heard[soldier.id].steps, soldier.truth, played.start_ns)
+            for soldier in exercise.soldiers
+        ],
+        "pictures": [picture_row(receiver, picture, ages) for receiver, picture in pictures.items()],
+        "links": _links(played),
+        "nets": [_net_row(name, counts, played.duration_s) for name, counts in played.nets.items()],
+        "events": [asdict(event) for event in events],
+    }
+    return Result(figures, played, compared, pictures, events)
 
 
-def _name(exercise: Exercise) -> str:
-    return "simulated walks" if exercise.soldiers[0].simulated else "recorded walks"
+def ages_of(exercise: Exercise) -> Ages:
+    """When the exercise's hubs call a report stale and lost."""
+    settings = hub_settings(exercise, exercise.command_post)
+    return Ages(settings.stale_s, settings.lost_s)
 
 
-def _links(stage: "Stage", duration_s: float) -> list[Row]:
+def _receivers(exercise: Exercise) -> list[str]:
+    """All computers, the command post first."""
+    return sorted(exercise.computers, key=lambda name: name != exercise.command_post)
+
+
+def _picture(played: Played, receiver: str, compared: Mapping[str, Compared]) -> Picture:
+    others = [each for name, each in compared.items() if name != receiver]
+    return sample_picture(played.heard[receiver].reports, others, played.start_ns, played.exercise)
+
+
+def _links(played: Played) -> list[Row]:
     return [
-        link_row(computer, report, duration_s)
-        for computer, observer in stage.observers.items()
-        for report in observer.heard().links.values()
+        link_row(computer, report, played.duration_s)
+        for computer, heard in played.heard.items()
+        for _, report in sorted(heard.links.items())
     ]
+
+
+def _net_row(name: str, counts: NetCounts, duration_s: float) -> Row:
+    return {"net": name, **asdict(counts), "bits_per_s": 8.0 * counts.bytes / duration_s}

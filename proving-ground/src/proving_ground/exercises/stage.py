@@ -1,11 +1,13 @@
-"""Puts an exercise on stage: a router per computer, two radio nets, every service as a real process, observers.
+"""Puts an exercise on stage: a router per computer, the radio nets, every service as a real process, observers.
 
 Nothing but the radio nets joins the computers: each has a router of its own, so what the command post shows has
-come over the air.
+come over the air. Processes start in waves, as many at a time as the machine's processors can bear; gateways last.
 """
 
+import os
 import socket
 import time
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -13,22 +15,40 @@ from pathlib import Path
 from types import TracebackType
 
 from bootprint.clock import NS_PER_S, ScaledClock
-from bootprint.errors import BootprintError
+from bootprint.errors import BootprintError, ConfigError
 from bootprint.geodesy import LocalFrame
+from bootprint.recording import Recorder
 from bootprint.stopping import Stop
 from bootprint.zenoh_bus import EmbeddedRouter
 from pdr_engine.foot import warm_up
-from proving_ground.exercises.emulated_radio import EmulatedNet, NetProfile
-from proving_ground.exercises.exercise import COMMAND_POST, LEADER, REALM, Exercise
-from proving_ground.exercises.exercise_files import Ports, write_computer, write_gateway, write_realm
-from proving_ground.exercises.observer import Observer
+from proving_ground.exercises.emulated_radio import EmulatedNet
+from proving_ground.exercises.exercise import REALM, Exercise, Soldier
+from proving_ground.exercises.exercise_files import (
+    Ports,
+    check_exercise,
+    write_computer,
+    write_gateway,
+    write_realm,
+)
+from proving_ground.exercises.observer import Observers
+from proving_ground.exercises.process_faults import ProcessFaults
 from proving_ground.exercises.processes import ProcessGroup, ProcessSpec
+from proving_ground.exercises.run_files import with_files
+from proving_ground.exercises.serial_feed import SerialFeed
+from proving_ground.exercises.truth_record import record_truth
 
-SQUAD_NET = NetProfile("squad", rate_bits_per_s=9600.0, latency_s=0.05, header_bytes=28, seed=1)
-COMPANY_NET = NetProfile("company", rate_bits_per_s=4800.0, latency_s=0.15, header_bytes=28, seed=2)
 GATEWAY = "sensor-gateway"
-_READY_TIMEOUT_S = 90.0
-_LEAD_S = (3.0, 10.0, 40.0)  # host seconds for the gateways to start before the walks do: one try each
+SOLDIER_SERVICES = ("pdr-engine", "fusion", "sa-hub")
+POST_SERVICES = ("sa-hub",)
+_READY_TIMEOUT_S = 120.0  # for one wave
+_WAVE_PER_PROCESSOR = 3
+# Host seconds for the gateways to start before the walks do: a base, each one's imports, each second of a unit.
+_LEAD_S, _LEAD_PER_GATEWAY_S, _LEAD_PER_PLAYED_S = 5.0, 2.0, 1.6e-3
+_LEAD_TRIES = (1.0, 3.0, 9.0)
+_LAST_CALL_S = 3.0  # host seconds before the walks: who is not there then will not be
+
+OnProgress = Callable[[int, int], None]
+"""Is told how many processes run, of how many."""
 
 
 class StageError(BootprintError):
@@ -37,34 +57,37 @@ class StageError(BootprintError):
 
 @dataclass(frozen=True)
 class Play:
-    """How the exercise is played."""
+    """How it is played: files below ``folder``; ``serial``: sensors by pseudo-terminal; ``record``: a file."""
 
     folder: Path
     speed: float = 1.0
-    loss: float = 0.0
+    serial: bool = False
+    record: Path | None = None
 
 
 class Stage:
     """An exercise's routers, nets, processes and observers; a context manager that leaves nothing behind."""
 
     def __init__(self, exercise: Exercise, play: Play) -> None:
-        self.exercise = exercise
+        if play.serial and play.speed != 1.0:
+            raise ConfigError("--serial pty: sensors on a line are live, so --speed must be 1")
+        check_exercise(exercise)
+        self.exercise = with_files(exercise, play.folder)
         self.speed = play.speed
         self.clock = ScaledClock(play.speed, time.time_ns())
         self.frame = LocalFrame(exercise.origin)
         self.start_ns = 0
+        self.processes = ProcessGroup()
+        self.nets: dict[str, EmulatedNet] = {}
+        self.observers: Observers
         self._play = play
         self._origin_s = self.clock.origin_ns / NS_PER_S
         self._stack = ExitStack()
-        self.processes = ProcessGroup()
-        self.observers: dict[str, Observer] = {}
-        self.nets: dict[str, EmulatedNet] = {}
-        self._routers: dict[str, str] = {}
-
-    @property
-    def computers(self) -> list[str]:
-        """Every computer: the soldiers', the squad leader's, the command post's."""
-        return [*(soldier.id for soldier in self.exercise.soldiers), LEADER, COMMAND_POST]
+        self._routers: dict[str, EmbeddedRouter] = {}
+        self._endpoints: dict[str, str] = {}
+        self._recorder: Recorder | None = None
+        self._serial: SerialFeed | None = None
+        self._faults = ProcessFaults(self)
 
     def __enter__(self) -> "Stage":
         try:
@@ -75,53 +98,78 @@ class Stage:
         return self
 
     def _build(self) -> None:
-        warm_up()  # compiles the foot filter once, if nobody has yet, rather than four times at once
+        warm_up()  # compiles the foot filter once, if nobody has yet, rather than in every process at once
         self._start_routers()
         ports = self._start_nets()
         write_realm(self._play.folder, self.exercise)
+        for computer in self.exercise.computers:
+            write_computer(self._play.folder, self.exercise, computer, self._endpoints[computer], ports)
+        if self._play.record is not None:
+            self._recorder = self._stack.enter_context(Recorder(self._play.record, overwrite=True))
+        self.observers = Observers(self._endpoints, REALM, self.clock, self.frame, self._recorder)
+        self._stack.callback(self.observers.close)
         self._stack.enter_context(self.processes)
-        for computer in self.computers:
-            write_computer(self._play.folder, self.exercise, computer, self._routers[computer], ports)
-            self._watch(computer)
-            self._start_services(computer)
+        if self._play.serial:
+            self._serial = self._stack.enter_context(SerialFeed(self.exercise, self._play.folder, self.clock))
 
     def _start_routers(self) -> None:
-        endpoints = [f"tcp/127.0.0.1:{port}" for port in free_ports(len(self.computers), socket.SOCK_STREAM)]
-        with ThreadPoolExecutor(len(endpoints)) as pool:  # a router takes half a second to come up
+        computers = self.exercise.computers
+        endpoints = [f"tcp/127.0.0.1:{port}" for port in free_ports(len(computers), socket.SOCK_STREAM)]
+        with ThreadPoolExecutor(min(8, len(endpoints))) as pool:  # a router takes half a second to come up
             routers = list(pool.map(EmbeddedRouter, endpoints))
-        for computer, router in zip(self.computers, routers, strict=True):
-            self._routers[computer] = router.endpoint
-            self._stack.callback(router.close)
+        for computer, router in zip(computers, routers, strict=True):
+            self._routers[computer] = router
+            self._endpoints[computer] = router.endpoint
+        self._stack.callback(self._close_routers)
+
+    def _close_routers(self) -> None:
+        for computer in list(self._routers):
+            self.close_router(computer)
+
+    def close_router(self, computer: str) -> None:
+        """A computer's router dies."""
+        router = self._routers.pop(computer, None)
+        if router is not None:
+            router.close()
+
+    def open_router(self, computer: str) -> None:
+        """A router at the same address again."""
+        self._routers[computer] = EmbeddedRouter(self._endpoints[computer])
 
     def _start_nets(self) -> Ports:
-        squad = [*(soldier.id for soldier in self.exercise.soldiers), LEADER]
-        numbers = free_ports(len(squad) + 2, socket.SOCK_DGRAM)
-        members = {
-            "squad": dict(zip(squad, numbers, strict=False)),
-            "company": {LEADER: numbers[-2], COMMAND_POST: numbers[-1]},
-        }
-        for profile in (SQUAD_NET, COMPANY_NET):
-            lossy = NetProfile(**{**profile.__dict__, "loss": self._play.loss})
-            net = EmulatedNet(lossy, list(members[profile.name].values()), self._play.speed)
-            net.start()
-            self._stack.callback(net.close)
-            self.nets[profile.name] = net
-        return Ports(members, {name: net.port for name, net in self.nets.items()})
+        nets = self.exercise.nets
+        numbers = iter(free_ports(sum(len(net.members) for net in nets), socket.SOCK_DGRAM))
+        ports = Ports()
+        for net in nets:
+            name = net.profile.name
+            ports.members[name] = {member: next(numbers) for member in net.members}
+            emulated = EmulatedNet(
+                net.profile, ports.members[name], self.speed, self.exercise.silences_s(net)
+            )
+            emulated.start()
+            self._stack.callback(emulated.close)
+            self.nets[name] = emulated
+            ports.nets[name] = emulated.port
+        return ports
 
-    def _watch(self, computer: str) -> None:
-        observer = Observer(computer, self._routers[computer], REALM, self.clock)
-        self.observers[computer] = observer
-        self._stack.callback(observer.close)
+    # -- processes --------------------------------------------------------------------------------------------
 
-    def _start_services(self, computer: str) -> None:
-        for service in self._services(computer):
-            self._spawn(computer, service, "computer.toml")
+    @property
+    def process_count(self) -> int:
+        """How many processes the exercise has, gateways included."""
+        return sum(len(self._services(computer)) for computer in self.exercise.computers) + len(
+            self.exercise.soldiers
+        )
 
     def _services(self, computer: str) -> tuple[str, ...]:
-        return ("sa-hub",) if computer in (LEADER, COMMAND_POST) else ("pdr-engine", "fusion", "sa-hub")
+        posts = {hub.id for hub in self.exercise.hubs}
+        return POST_SERVICES if computer in posts else SOLDIER_SERVICES
 
-    def _spawn(self, computer: str, service: str, config: str) -> None:
+    def spawn(self, computer: str, service: str) -> None:
+        """Start one service of a computer."""
         folder = self._play.folder / computer
+        config = "gateway.toml" if service == GATEWAY else "computer.toml"
+        self.observers.forget(computer, service)
         self.processes.start(
             ProcessSpec(
                 name=f"{computer}/{service}",
@@ -136,48 +184,92 @@ class Stage:
             )
         )
 
-    def wait_ready(self, stop: Stop) -> None:
-        """Wait until every service lives (or ``stop`` is set); StageError names those that do not."""
+    def wait_ready(self, stop: Stop, on_progress: OnProgress = lambda _done, _of: None) -> None:
+        """Start all services but the gateways; StageError names those that do not come up."""
+        wanted = [
+            (computer, service)
+            for computer in self.exercise.computers
+            for service in self._services(computer)
+        ]
+        self._start_waves(wanted, stop, on_progress, lambda: False)
+
+    def _start_waves(
+        self,
+        wanted: Sequence[tuple[str, str]],
+        stop: Stop,
+        on_progress: OnProgress,
+        too_late: Callable[[], bool],
+    ) -> bool:
+        """Wave after wave, each awaited; False if stopped, or too late."""
+        size = _WAVE_PER_PROCESSOR * (os.cpu_count() or 1)
+        for first in range(0, len(wanted), size):
+            wave = wanted[first : first + size]
+            for computer, service in wave:
+                if too_late():
+                    return False
+                self.spawn(computer, service)
+            if not self._await(wave, stop, too_late):
+                return False
+            on_progress(len(self.processes.pids), self.process_count)
+        return not too_late()
+
+    def _await(self, wave: Sequence[tuple[str, str]], stop: Stop, too_late: Callable[[], bool]) -> bool:
         deadline = time.monotonic() + _READY_TIMEOUT_S
-        while missing := self._missing():
+        while missing := [f"{c}/{s}" for c, s in wave if s not in self.observers.alive(c)]:
             self.processes.check()
             if time.monotonic() > deadline:
                 raise StageError(f"not running after {_READY_TIMEOUT_S:g} s: {', '.join(missing)}")
-            if stop.wait(0.1):
-                return
+            if too_late() or stop.wait(0.05):
+                return False
+        return True
 
-    def _missing(self) -> list[str]:
-        return [
-            f"{computer}/{service}"
-            for computer, observer in self.observers.items()
-            for service in sorted(set(self._services(computer)) - observer.alive())
-        ]
-
-    def start_walks(self, stop: Stop) -> None:
+    def start_walks(self, stop: Stop, on_progress: OnProgress = lambda _done, _of: None) -> None:
         """Start the gateways; all walks begin at ``start_ns`` of event time, a whole second.
 
-        A gateway that is not there by then would have to hurry after its walk, so on a busy machine they are
-        started again with more time; StageError if even that is not enough.
+        A gateway that is not there by then would have to hurry after its walk, so on a busy machine all are killed
+        before the first has sent anything, and started again with more time; StageError if that is not enough.
         """
-        gateways = [f"{soldier.id}/{GATEWAY}" for soldier in self.exercise.soldiers]
-        for lead_s in _LEAD_S:
-            ready_ns = self.clock.now_ns() + round(lead_s * self.speed * NS_PER_S)
-            self.start_ns = -(-ready_ns // NS_PER_S) * NS_PER_S
+        gateways = [(soldier.id, GATEWAY) for soldier in self.exercise.soldiers]
+        least_s = _lead_s(self.exercise.soldiers)
+        for patience in _LEAD_TRIES:
+            self._set_start(least_s * patience)
             for soldier in self.exercise.soldiers:
-                write_gateway(self._play.folder, soldier, self._routers[soldier.id], self.start_ns)
-                self._spawn(soldier.id, GATEWAY, "gateway.toml")
-            if self._gateways_in_time(stop) or stop.is_set():
+                self._write_gateway(soldier)
+            if self._start_waves(gateways, stop, on_progress, self._is_too_late) or stop.is_set():
+                self._begin()
                 return
-            self.processes.stop(gateways)
-        raise StageError(f"the gateways did not start within {_LEAD_S[-1]:g} s: this machine is too busy")
+            for computer, service in gateways:
+                self.processes.kill(f"{computer}/{service}")
+        raise StageError(
+            f"the gateways did not start within {least_s * _LEAD_TRIES[-1]:.0f} s: this machine is too busy"
+        )
 
-    def _gateways_in_time(self, stop: Stop) -> bool:
-        """Whether all gateways live before the walks begin."""
-        while not all(GATEWAY in self.observers[soldier.id].alive() for soldier in self.exercise.soldiers):
-            self.processes.check()
-            if self.elapsed_s >= 0.0 or stop.wait(0.1):
-                return False
-        return self.elapsed_s < 0.0
+    def _is_too_late(self) -> bool:
+        return self.elapsed_s > -_LAST_CALL_S * self.speed
+
+    def _set_start(self, lead_s: float) -> None:
+        ready_ns = self.clock.now_ns() + round(lead_s * self.speed * NS_PER_S)
+        self.start_ns = -(-ready_ns // NS_PER_S) * NS_PER_S
+
+    def _write_gateway(self, soldier: Soldier) -> None:
+        serial = None if self._serial is None else self._serial.source(soldier)
+        write_gateway(self._play.folder, soldier, self._endpoints[soldier.id], self.start_ns, serial)
+
+    def _begin(self) -> None:
+        for net in self.nets.values():
+            net.begin(self.clock.host_seconds_until(self.start_ns))
+        if self._serial is not None:
+            self._serial.start(self.start_ns)
+
+    def play_faults(self) -> None:
+        """Do what is to break by now, and mend what was broken long enough."""
+        self._faults.play(self.elapsed_s)
+
+    def close_watch(self) -> None:
+        """The exercise is over: take in what has been said, and record the truth beside it."""
+        self.observers.close()
+        if self._recorder is not None:
+            record_truth(self._recorder, self.exercise, self.start_ns)
 
     @property
     def elapsed_s(self) -> float:
@@ -188,6 +280,13 @@ class Stage:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._stack.close()
+
+
+def _lead_s(soldiers: Sequence[Soldier]) -> float:
+    """How long all gateways may take to start and to read what they play, by this machine's processors."""
+    played_s = sum(soldier.run.duration_s * len(soldier.run.imus) for soldier in soldiers)
+    work_s = _LEAD_PER_GATEWAY_S * len(soldiers) + _LEAD_PER_PLAYED_S * played_s
+    return _LEAD_S + work_s / (os.cpu_count() or 1)
 
 
 def free_ports(count: int, kind: socket.SocketKind) -> list[int]:

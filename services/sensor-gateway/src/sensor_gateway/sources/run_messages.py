@@ -88,11 +88,16 @@ def _usable(time_s: FloatArray, *columns: FloatArray) -> Int64Array:
     return np.asarray(candidates[times > before], dtype=np.int64)
 
 
+def _chosen(values: FloatArray, rows: Int64Array) -> FloatArray:
+    """These rows; no copy of a long recording if it is all of them, as it nearly always is."""
+    return values if len(rows) == len(values) else values[rows]
+
+
 def _imu(imu: ImuSeries, start_ns: int, size: int, max_age_ns: int) -> Iterator[ImuBatch]:
     rows = _usable(imu.time_s, imu.accel_m_s2, imu.gyro_rad_s)
     times = _utc_ns(imu.time_s[rows], start_ns)
-    accel, gyro = imu.accel_m_s2[rows], imu.gyro_rad_s[rows]
-    mag = None if imu.mag_ut is None else imu.mag_ut[rows]
+    accel, gyro = _chosen(imu.accel_m_s2, rows), _chosen(imu.gyro_rad_s, rows)
+    mag = None if imu.mag_ut is None else _chosen(imu.mag_ut, rows)
     for sequence, (first, end) in enumerate(batch_bounds(times, size, max_age_ns)):
         field = None if mag is None or not np.isfinite(mag[first:end]).all() else mag[first:end]
         yield ImuBatch.from_arrays(sequence, times[first:end], accel[first:end], gyro[first:end], field)

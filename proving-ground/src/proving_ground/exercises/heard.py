@@ -1,0 +1,114 @@
+"""What one computer's bus has told during an exercise, kept as the score needs it; the same in both modes."""
+
+import math
+from array import array
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from bootprint.bus import Envelope
+from bootprint.clock import NS_PER_S
+from bootprint.geodesy import LocalFrame
+from bootprint.messages import FootStep, Health, LinkReport, Position, Track
+
+FloatArray = npt.NDArray[np.float64]
+WATCHED = ("foot_step", "position", "track", "link", "health")
+_COLUMNS = 6
+
+
+@dataclass(frozen=True)
+class Told:
+    """A computer's reports of one soldier in the order of their arrival, times s from the exercise's zero.
+
+    ``arrived_s``, ``stamp_s``, ``accuracy_m`` (one sigma) and ``floor`` (NaN if unknown) are (n,); ``place_m`` and
+    ``velocity_m_s`` (n, 2) are east and north.
+    """
+
+    arrived_s: FloatArray
+    stamp_s: FloatArray
+    place_m: FloatArray
+    velocity_m_s: FloatArray
+    accuracy_m: FloatArray
+    floor: FloatArray
+
+
+class ReportLog:
+    """The reports of one soldier: sixty-four bytes each, for a company has millions."""
+
+    def __init__(self) -> None:
+        self._times_ns = array("q")
+        self._values = array("d")
+
+    def add(self, arrived_ns: int, track: Track, frame: LocalFrame) -> None:
+        """A newer report has come."""
+        height_m = frame.origin.height_m if track.height_m is None else track.height_m
+        east_m, north_m, _ = frame.to_enu(track.latitude_deg, track.longitude_deg, height_m)
+        velocity = track.east_velocity_m_s, track.north_velocity_m_s
+        floor = math.nan if track.floor is None else float(track.floor)
+        self._times_ns.extend((arrived_ns, track.time_ns))
+        self._values.extend((east_m, north_m, *velocity, track.accuracy_m, floor))
+
+    def __len__(self) -> int:
+        return len(self._times_ns) // 2
+
+    def told(self, start_ns: int) -> Told:
+        """All of them as arrays."""
+        times = (np.array(self._times_ns, dtype=np.int64).reshape(-1, 2) - start_ns) / NS_PER_S
+        values = np.array(self._values, dtype=np.float64).reshape(-1, _COLUMNS)
+        return Told(times[:, 0], times[:, 1], values[:, 0:2], values[:, 2:4], values[:, 4], values[:, 5])
+
+
+@dataclass
+class Heard:
+    """What one computer's bus has told so far. ``newest`` are the newest tracks, ``reports`` those of others.
+
+    ``sent`` holds (time ns, bytes on the air so far) of every link; ``latency_s`` is host time from the event time
+    of the soldier's own position to its publication as a track.
+    """
+
+    positions: list[Position] = field(default_factory=list)
+    steps: dict[str, list[FootStep]] = field(default_factory=lambda: defaultdict(list))
+    newest: dict[str, Track] = field(default_factory=dict)
+    reports: dict[str, ReportLog] = field(default_factory=lambda: defaultdict(ReportLog))
+    links: dict[str, LinkReport] = field(default_factory=dict)
+    sent: dict[str, list[tuple[int, int]]] = field(default_factory=lambda: defaultdict(list))
+    health: dict[str, Health] = field(default_factory=dict)
+    latency_s: list[float] = field(default_factory=list)
+
+    def take(self, envelope: Envelope, arrived_ns: int, frame: LocalFrame) -> bool:
+        """Keep what a message says; whether it is a new report of the computer's own soldier."""
+        match envelope.message:
+            case Position() as position:
+                self.positions.append(position)
+            case FootStep() as step:
+                self.steps[envelope.address.source].append(step)
+            case Track() as track:
+                return self._take_track(track, envelope.address.soldier, arrived_ns, frame)
+            case LinkReport() as report:
+                self.links[report.link] = report
+                self.sent[report.link].append((report.time_ns, report.bytes_sent))
+            case Health() as health:
+                self.health[health.service] = health
+        return False
+
+    def _take_track(self, track: Track, computer: str, arrived_ns: int, frame: LocalFrame) -> bool:
+        previous = self.newest.get(track.soldier)
+        self.newest[track.soldier] = track
+        if previous is not None and track.time_ns <= previous.time_ns:
+            return False  # the same report published again, with a new state
+        if track.soldier != computer:
+            self.reports[track.soldier].add(arrived_ns, track, frame)
+        return track.soldier == computer
+
+    def alive(self) -> set[str]:
+        """Names of the services that have told of their health and not of their end."""
+        return {name for name, health in self.health.items() if health.state != "stopped"}
+
+
+def latency_p99_ms(heard: Sequence[Heard]) -> float | None:
+    """99th percentile of host time from a position's event time to the soldier's own track, over all soldiers."""
+    latencies = [latency for computer in heard for latency in computer.latency_s]
+    return float(1000.0 * np.percentile(latencies, 99)) if latencies else None
