@@ -8,7 +8,7 @@ import pytest
 from pdr_engine.foot import FootNavigator, FootSettings, clipping, intake
 from pdr_engine.foot.gap import doubt_gap
 from pdr_engine.foot.kernel import propagate
-from pdr_engine.foot.memory import SAMPLE, fresh_state
+from pdr_engine.foot.memory import RING, SAMPLE, fresh_state
 from pdr_engine.foot.parameters import parameters
 from support.foot_streams import START_NS, Stream, navigate, still, walk
 
@@ -60,6 +60,15 @@ def test_the_usual_interval_is_that_of_most_samples() -> None:
     state = taken(samples(list(5.0 * np.flatnonzero(kept)), [0.0] * int(kept.sum())))
     assert state["usual_ns"] == pytest.approx(INTERVAL_NS, rel=0.05)
     assert state["missing"] == pytest.approx(2000 - kept.sum(), abs=30)
+
+
+def test_a_sensor_that_becomes_slower_for_good_is_believed_in_the_end() -> None:
+    """200 Hz, then 60: at first two of three seem to be missing, in the last seconds none does."""
+    times_ms = np.concatenate([5.0 * np.arange(400), 2000.0 + 1000.0 / 60.0 * np.arange(1800)])
+    state = taken(samples(list(times_ms), [0.0] * len(times_ms)))
+    assert state["usual_ns"] == pytest.approx(1e9 / 60.0, rel=0.05)
+    assert not state["filled"][np.arange(state["head"] - 1000, state["head"]) % RING].any()
+    assert 100 < state["missing"] < 1000
 
 
 def test_only_samples_that_came_are_reported() -> None:

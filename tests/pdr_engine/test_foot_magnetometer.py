@@ -274,6 +274,35 @@ def test_a_scalar_update_is_kalman_s() -> None:
     np.testing.assert_allclose(state["aid_P"], rest @ P @ rest.T + 4.0 * np.outer(gain, gain), atol=1e-12)
 
 
+def beside_the_reference(across_ut: float) -> tuple[np.void, np.void]:
+    """A field held to be (20, 0) µT within 1 µT of disturbance, and a stance that is this much beside it."""
+    state, foot = fresh_state(FootSettings())[0], parameters(FootSettings())[0]
+    state["aid_P"] = 1e-6 * np.eye(AID_STATES)
+    state["aid_x"][2] = 20.0
+    state["field"] = [20.0, across_ut, -40.0]
+    state["position"] = [1.0, 0.0, 0.0]
+    state["disturbance"], state["disturbance_sum"], state["fresh"] = 1.0, 2.0, 0.5
+    return state, foot
+
+
+def test_what_is_refused_counts_as_disturbance() -> None:
+    """A field that turns with the foot keeps its strength: only its direction tells that it is disturbed."""
+    state, foot = beside_the_reference(15.0)
+    before = state["aid_x"].copy()
+    magnetic._update(state, foot)
+    assert state["disturbance_sum"] == pytest.approx(2.0 + 0.5 * 15.0**2)
+    assert (state["fields_refused"], state["fields_used"]) == (1, 0)
+    assert np.array_equal(state["aid_x"], before)
+
+
+def test_what_is_used_does_not_count_as_disturbance() -> None:
+    state, foot = beside_the_reference(2.0)
+    magnetic._update(state, foot)
+    assert state["disturbance_sum"] == 2.0
+    assert (state["fields_refused"], state["fields_used"]) == (0, 1)
+    assert state["aid_x"][0] > 0.0
+
+
 @pytest.mark.parametrize("stop_s", [3.0, 60.0])
 def test_a_real_stop_does_not_turn_the_foot(stop_s: float) -> None:
     """The bias moves by 3°/min before the stop; what it turned until the stop had taught it is taken back."""

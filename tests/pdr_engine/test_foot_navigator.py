@@ -180,6 +180,7 @@ def test_a_walk_with_a_clipped_gyro_stays_good() -> None:
 
 
 def test_a_short_gap_is_counted_and_doubted() -> None:
+    """As much as it deserves: the landing behind it does not surprise (99 % of χ² with 3 degrees of freedom)."""
     in_swing = np.flatnonzero(np.abs(WALK.gyro[:, 1]) > 6.0)[0]
     kept = np.ones(len(WALK.time_ns), bool)
     kept[in_swing : in_swing + 20] = False
@@ -187,6 +188,7 @@ def test_a_short_gap_is_counted_and_doubted() -> None:
     assert gap.counters["gaps"] == 1
     hit = next(i for i, step in enumerate(gap.steps) if step.motion != "standing")
     assert gap.steps[hit].covariance[0, 0] > 2 * whole.steps[hit].covariance[0, 0]
+    assert gap.steps[hit].landing_nis < 11.34
     assert not any(step.realigned for step in gap.steps)
 
 

@@ -119,10 +119,10 @@ def _how() -> str:
   {f.gate:g} sigmas inflates the measurement's noise instead of being refused. After each step place and heading
   are handed over with their 4×4 covariance and start anew (step-wise cascade).
 - **Noise.** Densities, so that nothing depends on the rate: {f.accel_noise_m_s2_sqrt_hz:g} m/s²/√Hz and
-  {f.gyro_noise_rad_s_sqrt_hz:g} rad/s/√Hz, and {f.accel_scale_sqrt_s:g} √s of the force for what scale errors and
-  bandwidth add. A shock adds its change of force within a sample, times {1e3 * f.accel_timing_s:g} ms. Stamps
-  may be irregular: each interval is taken as it is, and one above {1e-6 * GAP_NS:.0f} ms is a gap, which adds
-  what a foot may do unseen.
+  {f.gyro_noise_rad_s_sqrt_hz:g} rad/s/√Hz, and for what scale errors and bandwidth add {f.accel_scale_sqrt_s:g} √s
+  of the force and {f.gyro_scale_sqrt_s:g} √s of the rate. A shock adds its change of force within a sample, times
+  {1e3 * f.accel_timing_s:g} ms. Stamps may be irregular: each interval is taken as it is, and one above
+  {1e-6 * GAP_NS:.0f} ms is a gap, which adds what a foot may do unseen.
 - **Stance.** A network of {HIDDEN} hidden units looks at the energies of force and rate in windows from a second
   before a sample to 40 ms after it, and tells the scale σ of the foot's velocity there. Below
   {d.learned_sigma_m_s:g} m/s the zero-velocity update is applied, with {f.learned_noise:g} σ as its noise: a foot
@@ -141,9 +141,10 @@ def _how() -> str:
 - **Each step** also tells its class and direction, length, clearance (the swing's heights after the landing has
   corrected them), swing and stance times, and its quality (detector and landing).
 - **Saturation.** A peak of the gyro whose flanks point higher than it reaches has been cut off: it is rebuilt
-  between them (cubic Hermite), and its axis is doubted while it lasts. A runner's gyro of 500 °/s stands at its
-  limit for 150 ms: what the far flank tells too late for the samples that are already used is added to the others.
-  An accelerometer's limit shows by its repetition; at it, velocity along its axis is doubted.
+  between them (cubic Hermite), and its axis is doubted while it lasts, the more the higher it was rebuilt. A
+  runner's gyro of 500 °/s stands at its limit for 150 ms: what the far flank tells too late for the samples that
+  are already used is added to the others. An accelerometer's limit shows by its repetition; at it, velocity along
+  its axis is doubted.
 - **Missing samples.** Up to {1e-6 * GAP_NS:.0f} ms are interpolated, with more noise. Across a longer gap the
   velocity stays, doubted by a white acceleration; from a second on the foot is aligned anew.
 - **Alignment.** Attitude and gyro bias come from {a.window_s:g} s that are *verified* still, or after

@@ -10,9 +10,11 @@ import math
 
 from pdr_engine.foot.compiled import Record, compiled
 from pdr_engine.foot.memory import (
+    ALIGNING,
     ATTITUDE,
     HEADING,
     LEVER,
+    LONG_GAP_NS,
     MASK,
     NS,
     POSITION,
@@ -82,9 +84,16 @@ def _keep_heading(s: Record) -> None:
 
 
 @compiled
+def _lost_s(s: Record) -> float:
+    """How long the fault was; as long as a long gap at least where the clock was set back and cannot tell."""
+    lost_ns = s.time_ns[s.start & MASK] - s.lost_since_ns
+    return (lost_ns if lost_ns > 0 else LONG_GAP_NS) * NS if s.began else 0.0
+
+
+@compiled
 def _start_covariance(s: Record, p: Record, tilt_sigma: float, speed_sigma: float) -> None:
     """What a new alignment knows: tilt; velocity if at rest; place and heading as lost as the fault was long."""
-    lost_s = max(0.0, (s.time_ns[s.start & MASK] - s.lost_since_ns) * NS) if s.began else 0.0
+    lost_s = _lost_s(s)
     for i in range(STATES):
         for j in range(STATES):
             s.P[i, j] = 0.0
@@ -158,3 +167,13 @@ def try_align(s: Record, p: Record, now: bool) -> None:
         calmest = _quietest(s, p)
         if calmest >= 0:
             _align(s, p, window_start(s, calmest, QUIET_WINDOW_NS), calmest, False)
+        elif s.head - s.start >= RING_LIMIT:
+            wait_from(s, s.head)
+
+
+@compiled
+def wait_from(s: Record, start: int) -> None:
+    """Wait for an alignment with the samples from ``start`` on; those before, if any still wait, are lost."""
+    s.mode = ALIGNING
+    s.start = s.done = s.clean = s.looked = start
+    s.unbroken = max(s.unbroken, start)

@@ -51,9 +51,13 @@ def _window(s: Record, at: int, centre_s: float, half_s: float) -> Mean:
     rate_hz = s.rate_hz
     centre = at + math.floor(centre_s * rate_hz + 0.5)
     half = max(1, math.floor(half_s * rate_hz + 0.5))
-    oldest = max(s.start, s.unbroken, s.clean - REACH)
-    lo = min(max(centre - half, oldest), s.clean - 1)
-    hi = min(max(centre + half, oldest), s.clean - 1)
+    oldest, newest = max(s.start, s.clean - REACH), s.clean - 1
+    if at < s.unbroken:  # a gap lies ahead: what comes behind it tells nothing of this sample
+        newest = min(newest, s.unbroken - 1)
+    else:
+        oldest = max(oldest, s.unbroken)
+    lo = min(max(centre - half, oldest), newest)
+    hi = min(max(centre + half, oldest), newest)
     a, b, scale = (lo - 1) & MASK, hi & MASK, 1.0 / (hi - lo + 1)
     fx, fy, fz = (
         (s.sums[b, 0] - s.sums[a, 0]) * scale,

@@ -11,27 +11,29 @@ from pdr_engine.foot.compiled import Record, compiled
 from pdr_engine.foot.memory import GAP_NS, LONG_GAP_NS, MASK
 
 CLOCK_PATIENCE = 100  # samples
+# What no sensor for feet gives: the square of such a number would stay in the running sums for good.
+MOST_FORCE_M_S2, MOST_RATE_RAD_S = 1e5, 1e4
+SHORTEST_NS = 100_000  # 10 kHz: closer stamps are a clock's fault, and more samples than the rings can hold
 DROPPED, ACCEPTED, AFTER_LONG_GAP = 0, 1, 2
 MISSING = 1.7  # intervals: a longer one is taken to have lost samples (stamps may tremble)
 TRACKING = 0.02  # part by which the usual interval follows each interval, up or down: it tends to the median
+STRETCHING = 0.0025  # part by which each that lacks samples stretches it: a sensor may become slower for good
 
 
 @compiled
 def judge(s: Record, sample: Record) -> int:
-    """Whether a sample can be used: finite, and later than the one before.
+    """Whether a sample can be used: of a size that can be, and later than the one before.
 
     Where nothing but earlier stamps comes, the last good one was wrong, or the sensor's clock has been set back:
     after a while that counts as a gap, or one wild stamp would deafen the foot for good.
     """
-    total = 0.0
     for axis in range(3):
-        total += sample.accel[axis] + sample.gyro[axis]
-    if not math.isfinite(total):
-        return DROPPED
+        if not (abs(sample.accel[axis]) < MOST_FORCE_M_S2 and abs(sample.gyro[axis]) < MOST_RATE_RAD_S):
+            return DROPPED
     if s.head == 0:
         return ACCEPTED
     step_ns = sample.time_ns - s.time_ns[(s.head - 1) & MASK]
-    if step_ns <= 0 and s.dropped_in_a_row < CLOCK_PATIENCE:
+    if 0 < step_ns < SHORTEST_NS or (step_ns <= 0 and s.dropped_in_a_row < CLOCK_PATIENCE):
         return DROPPED
     if step_ns <= 0:
         return AFTER_LONG_GAP
@@ -83,7 +85,9 @@ def push(s: Record, sample: Record) -> None:
         if step_ns > GAP_NS:
             s.gaps += 1
             s.unbroken = s.head
-        elif s.filled[(s.head - 1) & MASK] == 0:
+        elif s.filled[(s.head - 1) & MASK]:
+            s.usual_ns *= 1.0 + STRETCHING
+        else:
             _learn_interval(s, step_ns)
     s.time_ns[place] = sample.time_ns
     for axis in range(3):

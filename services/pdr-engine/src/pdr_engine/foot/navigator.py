@@ -134,10 +134,13 @@ class FootNavigator:
         """Whether the sensors do not fit together: one stance in ten, of ten at least, begins seven sigmas off.
 
         Left-handed axes and wrong units do that; of the recorded walks none does, whatever fault is put into it
-        (`proving_ground.evaluation.faults`), but some at 50 Hz.
+        (`proving_ground.evaluation.faults`), but some at 50 Hz. Or the filter is lost more often than the foot
+        stands, and ten times at least: a force a hundred times too large, or none.
         """
-        stances, contradictions = (int(self._state[name][0]) for name in ("stances", "contradictions"))
-        return stances >= CONTRADICTED_STANCES and contradictions > CONTRADICTED_SHARE * stances
+        names = ("stances", "contradictions", "realignments")
+        stances, contradictions, realignments = (int(self._state[name][0]) for name in names)
+        surprised = stances >= CONTRADICTED_STANCES and contradictions > CONTRADICTED_SHARE * stances
+        return surprised or realignments > max(stances, CONTRADICTED_STANCES)
 
     @property
     def gyro_bias_rad_s(self) -> Float64Array:

@@ -1,6 +1,8 @@
 """Stance detectors: a statistic of a short window against a threshold; below it, the whole window is stance.
 
-``adaptive`` (default)  SHOE whose threshold grows with the time since the last stance, so that a stride never
+The default is another, `learned`; these are for comparison and for who wants them.
+
+``adaptive``            SHOE whose threshold grows with the time since the last stance, so that a stride never
                         passes without one (REFERENCES.md)
 ``shoe``                generalised likelihood ratio of "still" (Skog et al. 2010), fixed threshold
 ``gyro``                D2: RMS of the angular rate (Rantakokko et al., FOI)

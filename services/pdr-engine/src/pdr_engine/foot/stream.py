@@ -8,7 +8,7 @@ filter (``done``); each stage waits for its look-ahead, together less than 100 m
 import math
 from typing import Any
 
-from pdr_engine.foot.alignment import try_align
+from pdr_engine.foot.alignment import try_align, wait_from
 from pdr_engine.foot.clipping import mend, watch_force
 from pdr_engine.foot.compiled import Record, compiled
 from pdr_engine.foot.features import accumulate
@@ -96,9 +96,7 @@ def _break_off(s: Record) -> None:
 @compiled
 def _realign(s: Record, start: int) -> None:
     """Wait for an alignment with the samples from ``start`` on."""
-    s.mode = ALIGNING
-    s.start = s.done = s.clean = s.looked = start
-    s.unbroken = max(s.unbroken, start)
+    wait_from(s, start)
     s.in_stance = 0
     s.stop_samples = 0
     if s.aligned:
@@ -182,11 +180,15 @@ def _diverged(s: Record, p: Record) -> bool:
 
 @compiled
 def _recover(s: Record, at: int) -> None:
-    """Back to where the last step ended, and align anew with the samples from here on."""
+    """Back to where the last step ended, and align anew with the samples from here on.
+
+    Not with what the alignment that fails at once was found in: wrong units would try again at every sample.
+    """
     assign(s.position, s.step_position)
     s.yaw = s.step_yaw
     s.lost_since_ns = s.step_time_ns
-    _realign(s, at + 1)
+    at_once = s.time_ns[at & MASK] - s.time_ns[s.start & MASK] < LATENCY_NS
+    _realign(s, s.head if at_once else at + 1)
 
 
 @compiled
@@ -211,7 +213,7 @@ def _write_estimate(s: Record, at: int, estimates: Any) -> None:
 def _watch_stop(s: Record, p: Record, at: int) -> None:
     """In a stop that is verified still block by block, learn the gyro bias from the mean rate of the whole stop."""
     place = at & MASK
-    if s.still[place] == 0 or at == s.unbroken:
+    if s.still[place] == 0 or at == s.start or s.time_ns[place] - s.time_ns[(at - 1) & MASK] > GAP_NS:
         s.stop_samples = 0
         return
     if s.stop_samples == 0:

@@ -8,7 +8,7 @@ time since the foot was lifted.
 import math
 
 from pdr_engine.foot.compiled import Record, compiled
-from pdr_engine.foot.memory import MASK, STANCE_END_NS
+from pdr_engine.foot.memory import GAP_NS, MASK, RING, STANCE_END_NS
 from pdr_engine.foot.quaternion import Vector, assign
 
 VERTICAL_M = 0.05  # a shorter way across the ground gives no line that a foot could pass above
@@ -21,7 +21,7 @@ def follow(s: Record, at: int) -> None:
     if s.still[place]:
         for axis in range(3):
             s.correction[axis] += s.position[axis] - s.predicted[axis]
-        _rest(s, s.time_ns[place])
+        _rest(s, at)
         return
     if s.landed != at - 1 or s.lifted > s.landed:
         _lift(s, at)
@@ -63,9 +63,15 @@ def dot(a: Record, b: Record) -> float:
 
 
 @compiled
-def _rest(s: Record, now_ns: int) -> None:
-    """Keep the books of the stance; one that was lifted for longer than a detector's slip is a new one."""
-    if now_ns - s.rest_until_ns > STANCE_END_NS:
+def _rest(s: Record, at: int) -> None:
+    """Keep the books of the stance; one that was lifted for longer than a detector's slip is a new one.
+
+    So is one behind a gap, but not the next sample of a slow sensor.
+    """
+    now_ns = s.time_ns[at & MASK]
+    away_ns = now_ns - s.rest_until_ns
+    lifted = s.lifted <= s.landed == at - 1
+    if away_ns > (STANCE_END_NS if lifted or at == s.start else GAP_NS):
         s.rest_since_ns = now_ns
         s.worst_nis = 0.0
         assign(s.up, (0.0, 0.0, 0.0))
@@ -103,7 +109,7 @@ def _tilt_away(s: Record) -> None:
 def _spread(s: Record) -> None:
     """Correct the newest swing's places by what the stance after it has found."""
     span = s.landed - s.lifted + 1
-    for k in range(max(s.lifted, s.landed - MASK + 1), s.landed + 1):
+    for k in range(max(s.lifted, s.head - RING), s.landed + 1):
         for axis in range(3):
             s.flight[k & MASK, axis] += s.correction[axis] * (k - s.lifted + 1) / span
     assign(s.correction, (0.0, 0.0, 0.0))
@@ -122,7 +128,7 @@ def clearance(s: Record) -> float:
     z = s.position[2] - s.step_position[2]
     square = x * x + y * y
     highest = 0.0
-    for k in range(max(s.swing, s.landed - MASK + 1), s.landed + 1):
+    for k in range(max(s.swing, s.head - RING), s.landed + 1):
         place = k & MASK
         if s.still[place]:
             continue
