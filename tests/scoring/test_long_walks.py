@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from proving_ground.evaluation.foot_page import _heading
+from proving_ground.evaluation.foot_heading_page import heading
 from proving_ground.evaluation.long_walks import (
     EARTH,
     MOUNTING,
@@ -21,7 +21,7 @@ def test_the_table_s_figures_by_hand() -> None:
     ]
     lines = long_walks_table({"a street": found})
     assert lines[2] == "| a street | 3 | 2.00 → 2.50 | 3.00 → 2.00 | 6.00 → 3.00 | 0.40 → 0.20 | 1 |"
-    assert lines[2] in _heading({"a street": found})
+    assert lines[2] in heading({"a street": found})
 
 
 def test_iron_lies_only_where_it_should() -> None:

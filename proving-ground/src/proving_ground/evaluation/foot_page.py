@@ -11,9 +11,10 @@ from pdr_engine.foot.presets import REFERENCE, SENSORS
 from proving_ground.evaluation.benchmark import LIMITS, FootFigures
 from proving_ground.evaluation.cross_fit import summary
 from proving_ground.evaluation.evaluate import Row
+from proving_ground.evaluation.foot_heading_page import heading
 from proving_ground.evaluation.foot_motion_page import MotionFindings, classes, covariance
 from proving_ground.evaluation.foot_tried import TRIED
-from proving_ground.evaluation.long_walks import Comparison, long_walks_table
+from proving_ground.evaluation.long_walks import Comparison
 from proving_ground.evaluation.robustness import Degradation, degradation_table
 from proving_ground.evaluation.stance_examples import SETS
 
@@ -85,7 +86,7 @@ def page(findings: Findings) -> str:
         _sources(findings),
         _all_methods(findings),
         _ablation(findings),
-        *([_heading(findings.long_walks)] if findings.long_walks else []),
+        *([heading(findings.long_walks)] if findings.long_walks else []),
         _faults(findings),
         TRIED,
         _pictures(),
@@ -232,29 +233,6 @@ def _ablation(findings: Findings) -> str:
         cells = " | ".join(_three(variants[name]) for variants in findings.ablation.values())
         lines.append(f"| {name} | {cells} |")
     return "\n".join(lines)
-
-
-def _heading(long_walks: Mapping[str, Sequence[Comparison]]) -> str:
-    share = FootSettings().magnetometer.disturbed_share
-    text = f"""## Heading over long walks
-
-- **Magnetometer at stand-still.** Once a stance the mean field, calibrated and levelled, feeds a filter of six
-  states (heading, drift, horizontal field, iron on the boot). How far the field's strength wanders from place to
-  place is taken for its disturbance: above {100 * share:g} % of the horizontal part nothing is used, nor before
-  some 15 m have shown it. The four recorded walks with a magnetometer (31, 33, 35, 39) lead over such floors
-  (7 to 11 µT of 25): their tracks are the same to the last bit with it and without.
-- **Stops.** What a stop verified still teaches of the gyro bias is taken out of the heading too (a
-  zero-angular-rate update): simulated stops of 2 to 300 s turn the foot by 0.03 to 0.05° instead of 0.10 to
-  0.20°. No recording has such a stop amid its way.
-- **Tried without gain**, fitted on every other walk of foot-gcp and tested on those between, °/min: the vertical
-  gyro's g-sensitivity 1.27 → 1.56 and 2.27 → 3.02; all gyros' 1.27 → 1.99 and 2.27 → 2.97; scale factors
-  1.27 → 1.57 and 2.27 → 2.32. Straight stretches taken for straight: the best of four thresholds wins 5 mm of RMSE
-  there, the worst loses 50 mm, and a street that bends by a radius of 400 m bends away (0.98 → 7.9 m): no
-  threshold tells a bend from a drift.
-
-Simulated walks of 900 m (12 min), a gyro whose bias wanders by 30 °/h, without → with the magnetometer
-(`python -m proving_ground.evaluation.long_walks`). A simulated stance is perfect: only the comparison counts."""
-    return "\n".join([text, "", *long_walks_table(long_walks)])
 
 
 def _faults(findings: Findings) -> str:
