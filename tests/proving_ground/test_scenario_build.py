@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bootprint.geodesy import yaw_of_azimuth
 from proving_ground.exercises.exercise import Exercise, Fault
 from proving_ground.scenario import Scenario, load_scenario
 from proving_ground.scenario.build import build, instrumented, start_of
 from proving_ground.scenario.surroundings import Surroundings
+from sensor_gateway.recordings.run import Truth
 from support.scenarios import HEAD, HOUSE, team, written
 
 UNITS = """
@@ -128,15 +130,30 @@ def test_iron_bends_the_field_near_it(scenario: Scenario) -> None:
     assert near[2] - far[2] == pytest.approx(16.0, rel=0.1)
 
 
+# Stands, then goes north-west, whichever way the body faces.
+NORTH_WEST = Truth(np.arange(4.0), np.array([[0.0, 0, 0], [0, 0, 0], [-1, 1, 0], [-5, 5, 0]]))
+
+
 def test_the_start_is_as_wrong_as_it_says(scenario: Scenario) -> None:
-    errors = []
+    errors, azimuths = [], []
     for seed in range(40):
         for soldier in scenario.cast.soldiers:
-            start = start_of(scenario, soldier, seed)
+            start = start_of(scenario, soldier, NORTH_WEST, seed)
             place = scenario.starts[soldier.id][0][0]
             errors.append([start["east_m"] - place[0], start["north_m"] - place[1]])
+            azimuths.append((start["azimuth_deg"] - 315.0) / start["azimuth_sigma_deg"])
             assert start["sigma_m"] == 0.3
     assert np.std(errors) == pytest.approx(0.3, rel=0.2)
+    assert abs(np.mean(azimuths)) < 0.3
+    assert np.std(azimuths) == pytest.approx(1.0, rel=0.2)
+
+
+def test_who_stays_is_given_the_way_they_face(scenario: Scenario) -> None:
+    soldier = scenario.cast.soldiers[0]
+    facing = scenario.starts[soldier.id][1]
+    start = start_of(scenario, soldier, Truth(np.arange(2.0), np.zeros((2, 3))), 1)
+    wrong = np.angle(np.exp(1j * (yaw_of_azimuth(np.radians(start["azimuth_deg"])) - facing)))
+    assert abs(np.degrees(wrong)) < 5.0 * start["azimuth_sigma_deg"]
 
 
 def test_posts_nets_and_faults_are_handed_over(scenario: Scenario, exercise: Exercise) -> None:

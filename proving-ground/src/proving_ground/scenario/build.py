@@ -20,7 +20,9 @@ from proving_ground.scenario.scenario import Play, Scenario
 from proving_ground.scenario.surroundings import Surroundings
 from proving_ground.sensors.run_writer import write_run_folder
 from sensor_gateway.recordings import load_runs
+from sensor_gateway.recordings.run import Truth
 
+_FIRST_METRES = 2.0
 _MOTION, _START = 1, 2  # streams of random numbers of one soldier; sensors have those from 10 on
 
 
@@ -78,19 +80,20 @@ def _instrumented(outfit: Outfit, folder: Path | None) -> Instrumented:
         callsign=soldier.callsign,
         run=run,
         truth=run.truth["body"],
-        start=start_of(scenario, soldier, outfit.surroundings.seed),
+        start=start_of(scenario, soldier, run.truth["body"], outfit.surroundings.seed),
         simulated=True,
         unit=soldier.unit,
         role=soldier.role,
     )
 
 
-def start_of(scenario: Scenario, soldier: Soldier, seed: int) -> dict[str, float]:
-    """The position and azimuth that a soldier is given: wrong by as much as they say they may be."""
+def start_of(scenario: Scenario, soldier: Soldier, truth: Truth, seed: int) -> dict[str, float]:
+    """The position, and the azimuth they walk off in, that a soldier is given: as wrong as they say they may be."""
     rng = np.random.default_rng([seed, soldier.number, _START])
-    place, yaw = scenario.starts[soldier.id]
+    place, facing = scenario.starts[soldier.id]
     sigma_m, sigma_deg = scenario.file.start_sigma_m, scenario.file.start_azimuth_sigma_deg
     east, north, up = place[0] + rng.normal(0.0, sigma_m, 3) * (1.0, 1.0, 0.0)
+    yaw = _first_course(truth, facing)
     azimuth_deg = math.degrees(azimuth_of(math.cos(yaw), math.sin(yaw))) + rng.normal(0.0, sigma_deg)
     return {
         "east_m": float(east),
@@ -100,6 +103,13 @@ def start_of(scenario: Scenario, soldier: Soldier, seed: int) -> dict[str, float
         "azimuth_deg": azimuth_deg % 360.0,
         "azimuth_sigma_deg": max(sigma_deg, 0.1),
     }
+
+
+def _first_course(truth: Truth, facing: float) -> float:
+    """Yaw of the first metres gone, whichever way the body faces; of the body if it stays where it is."""
+    way = truth.position_m[:, :2] - truth.position_m[0, :2]
+    gone = np.flatnonzero(np.hypot(way[:, 0], way[:, 1]) >= _FIRST_METRES)
+    return float(np.arctan2(way[gone[0], 1], way[gone[0], 0])) if gone.size else facing
 
 
 def _nets(scenario: Scenario, seed: int, duration_s: float) -> Iterator[Net]:
