@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import textwrap
@@ -11,6 +12,7 @@ import psutil
 import pytest
 
 from proving_ground.exercises.processes import ProcessError, ProcessGroup, ProcessSpec
+from proving_ground.exercises.stage import free_ports
 from support.routers import free_endpoint
 from support.waiting import wait_until
 
@@ -28,8 +30,8 @@ def is_running(pid: int) -> bool:
 
 def test_a_group_stops_all_it_started(tmp_path: Path) -> None:
     with ProcessGroup() as group:
-        for name in ("one", "two"):
-            group.start(router_spec(tmp_path, name))
+        for name, port in zip(("one", "two"), free_ports(2, socket.SOCK_STREAM), strict=True):
+            group.start(router_spec(tmp_path, name, f"tcp/127.0.0.1:{port}"))
         wait_until(lambda: all((tmp_path / f"{n}.log").read_text() for n in ("one", "two")))
         pids = list(group.pids.values())
         assert all(is_running(pid) for pid in pids)

@@ -1,13 +1,12 @@
 """`bootprint agreement`: how simulated people and their sensors compare with the recordings."""
 
-import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bootprint.commands.options import write_json
 from bootprint.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
 
     from proving_ground.agreement.comparison import Finding
 
-_STDOUT = Path("-")
+_STDOUT = "-"
 _SEEDS = 3
 _NO_LIMIT = 10_000  # columns of a file or pipe
 
@@ -30,7 +29,7 @@ def agreement(
     seeds: Annotated[int, typer.Option(min=1, help="Simulated twins of every recorded walk.")] = _SEEDS,
     check: Annotated[bool, typer.Option("--check", help="End with 1 if a figure does not agree.")] = False,
     json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write the rows as JSON (- for stdout).")
+        str | None, typer.Option("--json", metavar="FILE", help="Write the rows as JSON (- for stdout).")
     ] = None,
 ) -> None:
     """Compare simulated walks with recorded ones: signals, strides, and errors of the foot INS.
@@ -48,22 +47,11 @@ def agreement(
     if not found:
         raise ConfigError(f"{data}: holds none of the sets that simulated walks are compared with")
     if json_file is not None:
-        _write_json(rows_of(found), json_file)
+        write_json(rows_of(found), json_file)
     if json_file != _STDOUT:
         show(found, Console())
     if check and not all(finding.agrees for finding in found):
         raise typer.Exit(1)
-
-
-def _write_json(rows: Sequence[dict[str, object]], path: Path) -> None:
-    text = json.dumps(rows, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    if path == _STDOUT:
-        sys.stdout.write(text)
-        return
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"--json {path}: cannot be written: {error}") from error
 
 
 def show(found: Sequence["Finding"], console: "Console") -> None:

@@ -1,13 +1,12 @@
 """`bootprint evaluate`: recorded runs through the estimators, figures as a table, as JSON and as pictures."""
 
-import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bootprint.commands.options import write_json
 from bootprint.errors import ConfigError
 from proving_ground.evaluation.alignment import Align
 from sensor_gateway.recordings.run import Kind
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
     from proving_ground.evaluation.evaluate import Evaluated, Row, Task
 
-_STDOUT = Path("-")
+_STDOUT = "-"
 # Column: heading, digits after the point.
 _TABLE: dict[str, tuple[str, int]] = {
     "duration_s": ("s", 0),
@@ -71,7 +70,7 @@ def evaluate(
     ] = "best-fit",
     plot: Annotated[Path | None, typer.Option(metavar="DIR", help="Write a picture of every row.")] = None,
     json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write the rows as JSON (- for stdout).")
+        str | None, typer.Option("--json", metavar="FILE", help="Write the rows as JSON (- for stdout).")
     ] = None,
 ) -> None:
     """Score the estimators on recorded walks against their truth.
@@ -90,7 +89,7 @@ def evaluate(
     done = _compute(tasks, align, plot, Console(stderr=True))
     rows = [evaluated.row for evaluated in done]
     if json_file is not None:
-        _write_json(rows, json_file)
+        write_json(rows, json_file)
     if json_file != _STDOUT:
         show(rows, Console())
 
@@ -119,17 +118,6 @@ def _compute(
 
             save_plot(done[-1], plot)
     return done
-
-
-def _write_json(rows: Sequence["Row"], path: Path) -> None:
-    text = json.dumps(rows, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    if path == _STDOUT:
-        sys.stdout.write(text)
-        return
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"--json {path}: cannot be written: {error}") from error
 
 
 def show(rows: Sequence["Row"], console: "Console") -> None:

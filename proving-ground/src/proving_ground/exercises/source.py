@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proving_ground.exercises.exercise import Exercise, FloatArray, Hub, Soldier
+from proving_ground.exercises.exercise import Exercise, FloatArray, Soldier
 from proving_ground.exercises.squad import NAME, simulated_squad
 
 if TYPE_CHECKING:
@@ -39,20 +39,9 @@ def open_exercise(
 
 def _exercise(scenario: "Scenario", seed: int, soldiers: tuple[Soldier, ...], duration_s: float) -> Exercise:
     """What the scenario's own `build` makes, of soldiers who are there already; with outlines for maps."""
-    from proving_ground.scenario import build
+    from proving_ground.scenario.build import exercise_of
 
-    cast, file = scenario.cast, scenario.file
-    return Exercise(
-        soldiers=soldiers,
-        origin=file.origin,
-        name=scenario.name,
-        begins=file.start,
-        storeys_m=dict(sorted(scenario.site.heights_m.items())),
-        hubs=tuple(Hub(post.id, post.number, post.callsign, post.unit, post.role) for post in cast.posts),
-        nets=tuple(build._nets(scenario, seed, duration_s)),
-        faults=tuple(build._faults(scenario)),
-        plan=_plan(scenario),
-    )
+    return replace(exercise_of(scenario, seed, soldiers, duration_s), plan=_plan(scenario))
 
 
 def check_scenario(scenario: str) -> None:

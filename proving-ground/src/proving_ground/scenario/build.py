@@ -35,6 +35,13 @@ def build(scenario: Scenario, seed: int, folder: Path | None = None) -> Exercise
     """
     played = play(scenario, seed)
     soldiers = tuple(instrumented(scenario, played, seed, folder))
+    return exercise_of(scenario, seed, soldiers, played.duration_s)
+
+
+def exercise_of(
+    scenario: Scenario, seed: int, soldiers: tuple[Instrumented, ...], duration_s: float
+) -> Exercise:
+    """The exercise around soldiers who are instrumented already: posts, nets and faults."""
     cast = scenario.cast
     return Exercise(
         soldiers=soldiers,
@@ -43,7 +50,7 @@ def build(scenario: Scenario, seed: int, folder: Path | None = None) -> Exercise
         begins=scenario.file.start,
         storeys_m=dict(sorted(scenario.site.heights_m.items())),
         hubs=tuple(Hub(post.id, post.number, post.callsign, post.unit, post.role) for post in cast.posts),
-        nets=tuple(_nets(scenario, seed, played.duration_s)),
+        nets=tuple(_nets(scenario, seed, duration_s)),
         faults=tuple(_faults(scenario)),
     )
 
