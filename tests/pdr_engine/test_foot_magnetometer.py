@@ -32,7 +32,7 @@ from proving_ground.evaluation.long_walks import (
     compared,
     magnetic_walk,
 )
-from proving_ground.simulation.magnetics import Dipoles, Magnetometer
+from proving_ground.sensors.magnetics import DeviceIron
 from sensor_gateway.recordings import load_runs
 from support.foot_streams import START_NS, Stream, navigate, still, walk
 from support.recorded import recorded_data
@@ -40,8 +40,8 @@ from support.recorded import recorded_data
 ME = Identity("bp", "alpha", "a1")
 FLOOR = SURROUNDINGS[-1]
 CALIBRATED = MagnetometerCalibration(offset_ut=(1e-9, 0.0, 0.0))
-IRON = Magnetometer(
-    hard_iron_ut=(30.0, -20.0, 15.0), soft_iron=((1.1, 0.05, 0.0), (0.05, 0.9, 0.0), (0.0, 0.0, 1.0))
+IRON = DeviceIron(
+    np.array([30.0, -20.0, 15.0]), np.array([[1.1, 0.05, 0.0], [0.05, 0.9, 0.0], [0.0, 0.0, 1.0]])
 )
 
 
@@ -146,10 +146,10 @@ def test_a_broken_magnetometer_is_as_none(value: float) -> None:
 
 
 def test_iron_that_is_calibrated_away_does_no_harm() -> None:
-    walked = magnetic_walk(400.0, seed=11, magnetometer=IRON)
-    matrix = np.linalg.inv(np.asarray(IRON.soft_iron))
+    walked = magnetic_walk(400.0, seed=11, device=IRON)
+    matrix = np.linalg.inv(IRON.soft)
     calibration = convert(
-        {"offset_ut": list(IRON.hard_iron_ut), "matrix": matrix.tolist()},
+        {"offset_ut": IRON.hard_ut.tolist(), "matrix": matrix.tolist()},
         MagnetometerCalibration,
         where="test",
     )
@@ -312,11 +312,3 @@ def test_a_real_stop_does_not_turn_the_foot(stop_s: float) -> None:
     track = navigate(stream)
     begin = np.searchsorted(track.time_ns, stream.time_ns[len(walking.time_ns) - 200])
     assert abs(math.degrees(track.yaw_rad[-1] - track.yaw_rad[begin])) < 0.02
-
-
-def test_a_dipole_s_field_by_hand() -> None:
-    """On its axis µ0·m/(2π·r³), beside it half of that and the other way."""
-    iron = Dipoles(np.zeros((1, 3)), np.array([[0.0, 0.0, 5.0]]))
-    field = iron.field_ut(np.array([[0.0, 0.0, 0.5], [0.5, 0.0, 0.0]]))
-    on_axis_ut = 4e-7 * math.pi * 5.0 / (2.0 * math.pi * 0.5**3) * 1e6
-    np.testing.assert_allclose(field, [[0.0, 0.0, on_axis_ut], [0.0, 0.0, -on_axis_ut / 2.0]], rtol=1e-12)

@@ -20,9 +20,11 @@ from bootprint.geomagnetism import earth_field
 from pdr_engine.foot import FootSettings
 from proving_ground.evaluation.ablation import Variant, walked
 from proving_ground.evaluation.scoring import score_track
-from proving_ground.simulation.magnetics import NO_IRON, Magnetometer, boot_field, iron_under
+from proving_ground.motion import FloatArray
+from proving_ground.sensors.imu_quality import MagnetometerQuality
+from proving_ground.sensors.magnetics import DeviceIron, Dipoles, Magnetics, measure_field
+from proving_ground.sensors.randomness import gauss_markov, interpolated
 from proving_ground.simulation.walker import (
-    FloatArray,
     Gait,
     ImuQuality,
     Path3D,
@@ -40,7 +42,9 @@ SEEDS = range(300, 308)
 LENGTH_M = 900.0
 _WANDER_S = 200.0  # correlation time of the gyro bias
 _IRON_EVERY_M = 1.5
+_IRON_SIZE_M = 0.05
 _TRUTH_EVERY = 20  # samples
+_UNIT = MagnetometerQuality(noise_ut=0.3, hard_iron_ut=0.0, soft_iron=0.0, resolution_ut=0.01, rate_hz=200.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,11 +97,19 @@ def streets(length_m: float, rng: np.random.Generator) -> FloatArray:
     return np.array(points)
 
 
+def iron_under(path_m: FloatArray, moment_a_m2: float, rng: np.random.Generator) -> Dipoles:
+    """Dipoles of random direction, 0.2 to 0.6 m below a path (n, 3) and up to a metre aside of it."""
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path_m, axis=0), axis=1))])
+    place = interpolated(np.arange(0.0, arc[-1], _IRON_EVERY_M), arc, path_m)
+    place += rng.uniform([-1.0, -1.0, -0.6], [1.0, 1.0, -0.2], place.shape)
+    return Dipoles(place, rng.normal(0.0, moment_a_m2, place.shape), np.array([_IRON_SIZE_M]))
+
+
 def magnetic_walk(
     length_m: float,
     seed: int,
     *,
-    magnetometer: Magnetometer | None = None,
+    device: DeviceIron | None = None,
     surroundings: Surroundings = SURROUNDINGS[0],
     bias_instability_deg_per_h: float = 30.0,
 ) -> MagneticWalk:
@@ -106,31 +118,28 @@ def magnetic_walk(
     path, gait = Path3D(streets(length_m, rng)), Gait()
     motion = footfalls(path, gait, +1)
     imu = boot_imu(motion, walk_duration_s(path, gait), MOUNTING, ImuQuality(), rng)
-    iron = iron_under(path.points_m, _IRON_EVERY_M, surroundings.iron_a_m2, rng)
+    iron = iron_under(path.points_m, surroundings.iron_a_m2, rng)
     begin, end = (share * imu.time_s[-1] for share in surroundings.between)
     amid = ((imu.time_s >= begin) & (imu.time_s <= end))[:, None]
-    unit = magnetometer or Magnetometer()
-    clean, disturbed = (
-        boot_field(motion, imu.time_s, MOUNTING, EARTH, unit, rng, dipoles)
-        for dipoles in (NO_IRON, iron if surroundings.iron_a_m2 else NO_IRON)
-    )
-    wander = _gauss_markov(imu.time_s, np.radians(bias_instability_deg_per_h / 3600.0), rng)
     place, attitude = motion.at(imu.time_s)
+    clean, disturbed = (
+        measure_field(Magnetics(EARTH, dipoles, device), imu.time_s, place, attitude * MOUNTING, _UNIT, rng)
+        for dipoles in (Dipoles(), iron)
+    )
+    seconds = np.arange(0.0, imu.time_s[-1] + 1.0)
+    instability = np.radians(bias_instability_deg_per_h / 3600.0)
+    wander = gauss_markov(
+        len(seconds), 1.0, instability, _WANDER_S, np.random.default_rng([seed, 1]), columns=3
+    )
     return MagneticWalk(
-        replace(imu, gyro_rad_s=imu.gyro_rad_s + wander, mag_ut=np.where(amid, disturbed, clean)),
+        replace(
+            imu,
+            gyro_rad_s=imu.gyro_rad_s + interpolated(imu.time_s, seconds, wander),
+            mag_ut=np.where(amid, disturbed, clean),
+        ),
         place,
         np.unwrap(attitude.as_euler("ZYX")[:, 0]),
     )
-
-
-def _gauss_markov(time_s: FloatArray, sigma: float, rng: np.random.Generator) -> FloatArray:
-    """A bias (n, 3) that wanders, drawn once a second."""
-    seconds = np.arange(0.0, time_s[-1] + 1.0)
-    keep = np.exp(-1.0 / _WANDER_S)
-    state = [rng.normal(0.0, sigma, 3)]
-    for kick in rng.normal(0.0, sigma * np.sqrt(1.0 - keep**2), (len(seconds) - 1, 3)):
-        state.append(keep * state[-1] + kick)
-    return np.column_stack([np.interp(time_s, seconds, column) for column in np.array(state).T])
 
 
 def compared(walk: MagneticWalk) -> Comparison:
