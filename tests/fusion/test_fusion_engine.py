@@ -322,6 +322,50 @@ def test_a_silent_foot_leaves_the_other_and_joins_again() -> None:
     assert horizontal_error(out[-1], walk.body(LEFT, RIGHT, time_s=91.0)) < 0.8
 
 
+def unplugged(messages: list[Envelope], from_s: float, until_s: float) -> list[Envelope]:
+    """A foot's messages when its unit was unplugged: poses that go on from the old place, then one broken step."""
+    kept = [e for e in messages if not from_s * NS < e.message.time_ns - T0 < until_s * NS]
+    out: list[Envelope] = []
+    last, steps, poses = 0, 0, 0
+    for item in kept:
+        message = item.message
+        if isinstance(message, FootStep):
+            start_ns, broken = last or message.start_time_ns, message.sequence > steps
+            message = msgspec.structs.replace(message, sequence=steps, start_time_ns=start_ns)
+            if broken and not any(isinstance(e.message, FootStep) and e.message.realigned for e in out):
+                message = msgspec.structs.replace(message, realigned=True, displacement_m=(0.0, 0.0, 0.0))
+            last, steps = message.time_ns, steps + 1
+        elif isinstance(message, FootPose):
+            message = msgspec.structs.replace(message, sequence=poses, step_sequence=steps - 1)
+            poses += 1
+        out.append(Envelope(item.address, message))
+    return out
+
+
+@pytest.mark.parametrize("until_s", [23.1, 45.3])
+def test_a_foot_that_was_unplugged_does_not_pull_the_body_back_to_where_that_was(until_s: float) -> None:
+    walk = SimulatedWalk(straight(0.0), 90.0)
+    out, core = run(DUAL, walk.messages(LEFT), unplugged(walk.messages(RIGHT), 20.0, until_s))
+    errors = [horizontal_error(p, walk.body(LEFT, RIGHT, time_s=seconds(p))) for p in out[15:-5]]
+    assert max(errors) < 1.0
+    assert core.counters["poses_after_silence"] > 0
+    assert out[-1].sources == ("left_foot", "right_foot")
+
+
+def test_the_last_step_of_an_unplugged_foot_told_when_it_is_back_moves_that_foot_alone() -> None:
+    """A navigator tells what it held back when the next samples come: by then the other foot is far away."""
+    walk = SimulatedWalk(straight(0.0), 60.0)
+    right = [e for e in walk.messages(RIGHT) if e.message.time_ns < T0 + 20 * NS]
+    held = max((e for e in right if isinstance(e.message, FootStep)), key=lambda e: e.message.time_ns)
+    items = in_time_order(walk.messages(LEFT), [e for e in right if e is not held])
+    place = next(index for index, e in enumerate(items) if e.message.time_ns > T0 + 45 * NS)
+    core = FusionCore(DUAL, WHO, ORIGIN)
+    out = feed(core, [*items[:place], held, *items[place:]])
+    assert core.counters["late_foot_step"] == 1
+    errors = [horizontal_error(p, walk.body(LEFT, RIGHT, time_s=seconds(p))) for p in out[15:-5]]
+    assert max(errors) < 1.0
+
+
 # --- silence, loss, damage -------------------------------------------------------------------------------
 
 
@@ -357,6 +401,27 @@ def test_satellites_carry_on_when_the_boots_fall_silent() -> None:
     assert {position.mode for position in core_out} == {"gnss"}
     for position in core_out:
         assert horizontal_error(position, walk.body(LEFT, RIGHT, time_s=seconds(position))) < 8.0
+
+
+def test_silent_boots_are_waited_for_once_and_then_positions_come_in_time_again() -> None:
+    """Boots that end at 20 s, a receiver that is a quarter of a second slow, and the host's clock."""
+    walk = SimulatedWalk(straight(0.0), 40.0)
+    boots = [(e.message.time_ns, e) for e in walk.messages(LEFT) if e.message.time_ns < T0 + 20 * NS]
+    fixes = satellites(walk, np.arange(1.0, 40.0), error_m=0.3)
+    heard = sorted([*boots, *((e.message.time_ns + NS // 4, e) for e in fixes)], key=lambda item: item[0])
+    core = FusionCore(FusionConfig(feet=("left_foot",), start=EAST), WHO, ORIGIN)
+    delay_s: dict[float, float] = {}
+    for now_s in np.arange(0.05, 39.0, 0.05):
+        now_ns = T0 + round(now_s * NS)
+        due = [e for at_ns, e in heard if now_ns - NS // 20 < at_ns <= now_ns]
+        out = [m for e in due for m in core.handle(e)] + list(core.tick(now_ns))
+        delay_s |= {seconds(position): now_s - seconds(position) for position in positions(out)}
+    in_time = [delay for at, delay in delay_s.items() if at > 21.8]
+    assert 2.0 < max(delay_s.values()) < 2.5  # the first one that was waited for
+    assert len(in_time) > 80
+    assert max(in_time) < 0.7
+    assert core.counters["late_gnss"] == 0
+    assert core.counters["gnss_accepted"] > 35
 
 
 def test_lost_steps_widen_the_covariance_and_are_counted() -> None:

@@ -1,10 +1,15 @@
 """The filter against the textbook's other form, its gate, and the two ways in which feet share errors."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from bootprint.messages import FootStep, upper_triangle
-from fusion.filter import Measurement, StateFilter, chi_square_quantile, invert_spd
+from fusion.chi_square import chi_square_quantile
+from fusion.filter import Measurement, StateFilter, invert_spd
 from fusion.state import Array, Layout
 from fusion.transform import RigidTransform
 
@@ -53,6 +58,19 @@ def test_inverse_is_the_inverse() -> None:
 def test_quantile_is_that_of_the_tables() -> None:
     assert chi_square_quantile(0.95, 2) == pytest.approx(5.991, abs=1e-3)
     assert chi_square_quantile(0.999, 3) == pytest.approx(16.266, abs=1e-3)
+
+
+@pytest.mark.parametrize("degrees", [1, 2, 3, 4, 7, 50, 97])
+@pytest.mark.parametrize("probability", [1e-6, 0.05, 0.5, 0.95, 0.999, 1.0 - 1e-9])
+def test_quantile_is_scipy_s(probability: float, degrees: int) -> None:
+    expected = chi2.isf(1.0 - probability, degrees)
+    assert chi_square_quantile(probability, degrees) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_fusion_is_small() -> None:
+    """Every soldier's computer runs one: no scipy in it, which would double it."""
+    code = "import sys, fusion.main; sys.exit(any(name.startswith('scipy') for name in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_update_agrees_with_the_information_form() -> None:

@@ -133,7 +133,25 @@ def test_others_wait_for_the_drivers_but_not_for_ever() -> None:
     held.advance(3000)
     assert held.low_ns == 1000 - WINDOW
     held.advance(3001)
-    assert held.low_ns == 1001  # silence for longer than the patience
+    assert (
+        held.low_ns == 3001 - WINDOW
+    )  # silence for longer than the patience: no more doubt, and no more wait
+    held.advance(3400)
+    assert held.low_ns == 3400 - WINDOW
+    assert held.push("a", message(3400 - WINDOW, 1)) is Arrival.QUEUED  # awake again
+    held.push("a", message(3500, 2))
+    held.advance(3500)
+    held.advance(5500)
+    assert held.low_ns == 3500 - WINDOW  # and worth a new patience
+
+
+def test_before_the_drivers_were_ever_heard_the_patience_stands_for_the_doubt_about_clocks() -> None:
+    held = buffer("", drivers="a", patience=2 * S)
+    held.push("g", message(8 * S, 0))
+    for second in range(10, 20):
+        held.advance(second * S)
+    assert held.low_ns == 17 * S
+    assert held.push("g", message(17 * S, 1)) is Arrival.QUEUED  # a receiver two seconds behind the host
 
 
 def test_one_stamp_from_the_future_carries_nobody_along() -> None:
@@ -195,7 +213,7 @@ def test_silence_is_measured_on_each_clock_by_itself() -> None:
         assert held.low_ns == second * S - WINDOW
     for second in range(10, 13):
         held.push("g", message((second + 5) * S, second))
-    assert held.low_ns == 9 * S + 3 * S - 2 * S
+    assert held.low_ns == 9 * S + 3 * S - WINDOW
 
 
 def test_boots_that_leap_ahead_are_followed_once_they_insist_and_nothing_is_lost() -> None:
@@ -237,7 +255,7 @@ def test_a_backlog_after_silence_is_late_and_no_set_back() -> None:
     held.push("a", message(0, 0))
     for second in range(1, 100):
         held.advance(second * S)
-    assert held.low_ns == 97 * S
+    assert held.low_ns == 99 * S - WINDOW
     verdicts = {held.push("a", message(second * S, second)) for second in range(1, 80)}
     assert verdicts == {Arrival.LATE}
     assert held.set_back_ns is None

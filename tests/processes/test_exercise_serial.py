@@ -38,7 +38,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Result]:
         wait_until(
             lambda: "sa-hub" in stage.observers.alive(COMMAND_POST), timeout_s=30.0, what="the hub is back"
         )
-        stage.close_watch()
+        stage.end()
         nets = {name: net.counts for name, net in stage.nets.items()}
         yield result_of(
             Played(exercise, stage.start_ns, LENGTH_S, stage.observers.heard(), nets), {"mode": "test"}

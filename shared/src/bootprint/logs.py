@@ -2,10 +2,27 @@
 
 import logging
 import sys
+from contextlib import suppress
+from typing import TextIO, cast
 
 import structlog
 
 from bootprint.errors import ConfigError
+
+
+class _Enduring:
+    """Standard error, whatever it is at the time; a full disk behind it stops nobody."""
+
+    def write(self, text: str) -> None:
+        with suppress(OSError):
+            sys.stderr.write(text)
+
+    def flush(self) -> None:
+        with suppress(OSError):
+            sys.stderr.flush()
+
+
+_ERROR_STREAM = _Enduring()
 
 
 def configure(level: str = "info", *, json: bool = False) -> None:
@@ -26,5 +43,5 @@ def configure(level: str = "info", *, json: bool = False) -> None:
             renderer,
         ],
         wrapper_class=structlog.make_filtering_bound_logger(number),
-        logger_factory=lambda *_: structlog.PrintLogger(sys.stderr),  # whatever it is at the time
+        logger_factory=lambda *_: structlog.PrintLogger(cast("TextIO", _ERROR_STREAM)),
     )

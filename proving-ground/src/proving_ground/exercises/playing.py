@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from proving_ground.exercises.processes import ProcessError
     from proving_ground.exercises.result import Result
     from proving_ground.exercises.stage import Stage
+    from proving_ground.exercises.usage import UsageMeter
 
 Mode = Literal["processes", "inprocess"]
 _LINE_EVERY_S = 5.0  # host seconds between lines where there is no terminal
@@ -163,13 +164,12 @@ class Runner:
         self._length_s = length_s
         self._stop = stop
         self._headless = headless
+        self._meter: UsageMeter | None = None  # from the walks' beginning on
         self._usage: list[dict[str, Any]] = []
 
     def run(self) -> None:
         """Until the exercise has lasted its length or a signal came."""
         from rich.console import Console
-
-        from proving_ground.exercises.usage import UsageMeter
 
         console = Console(stderr=True)
         with progress_bars() as show:
@@ -180,14 +180,13 @@ class Runner:
         if self._stop.is_set():
             return
         console.print(f"{len(self._stage.processes.pids)} processes run, walks begin")
-        meter = UsageMeter(self._stage.processes.pids)
         try:
             if self._headless or not console.is_terminal:
                 self._lines(console)
             else:
                 self._live(console)
         finally:
-            self._usage = [dict(row) for row in meter.rows()]
+            self._usage = [dict(row) for row in self._meter.rows()] if self._meter else []
 
     def result(self) -> "Result":
         """The score of what was played."""
@@ -196,7 +195,7 @@ class Runner:
 
         stage = self._stage
         duration_s = max(stage.elapsed_s, 1e-9) if stage.start_ns else 1e-9
-        stage.close_watch()
+        stage.end()
         heard = stage.observers.heard()
         nets = {name: net.counts for name, net in stage.nets.items()}
         extra = {
@@ -209,6 +208,10 @@ class Runner:
         return result_of(Played(stage.exercise, stage.start_ns, duration_s, heard, nets), extra)
 
     def _going(self) -> bool:
+        from proving_ground.exercises.usage import UsageMeter
+
+        if self._meter is None and self._stage.elapsed_s >= 0.0:
+            self._meter = UsageMeter(self._stage.processes.pids)
         self._stage.play_faults()
         self._stage.processes.check()
         return self._stage.elapsed_s < self._length_s and not self._stop.is_set()

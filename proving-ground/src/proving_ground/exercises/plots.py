@@ -1,8 +1,6 @@
 """The report's plots as inline SVG: map, error over time and distance, distributions, radio use."""
 
-import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,140 +8,34 @@ import numpy as np
 from bootprint.clock import NS_PER_S
 from proving_ground.exercises.dead_reckoning import errors_m
 from proving_ground.exercises.exercise import FloatArray
+from proving_ground.exercises.map_plot import draw_map
+from proving_ground.exercises.plotting import (
+    FEW,
+    FUSED,
+    PICTURE,
+    STEPS,
+    Plot,
+    colours_of,
+    every,
+    new_figure,
+    svg_of,
+)
 from proving_ground.exercises.result import Result
-from proving_ground.exercises.score import Compared, true_floors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_TRUTH, _REPORTS, _STEPS, _FUSED, _PICTURE = "#b3bcc5", "#e36209", "#a475f9", "#0b6bcb", "#e36209"
-_FEW = 12  # soldiers whose lines can be told apart
-_MOST_POINTS = 40_000  # in one plot, so that the page stays small
 _BINS = 60
 _WINDOW_S = 10.0
-
-
-@dataclass(frozen=True)
-class Plot:
-    """A picture with its title and what to see in it."""
-
-    title: str
-    svg: str
-    caption: str
 
 
 def plots_of(result: Result) -> list[Plot]:
     """All plots that the result has data for."""
     if not result.compared:
         return []
-    makers = (_map, _over_time, _over_distance, _distributions, _radio)
+    makers = (draw_map, _over_time, _over_distance, _distributions, _radio)
     return [plot for plot in (maker(result) for maker in makers) if plot is not None]
-
-
-def _figure(columns: int = 1, width: float = 10.0, height: float = 3.8) -> "tuple[Figure, Sequence[Axes]]":
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    mpl.rcParams.update({"svg.hashsalt": "bootprint", "font.size": 9, "axes.grid": True, "grid.alpha": 0.3})
-    figure = Figure(figsize=(width, height), layout="constrained")
-    axes = figure.subplots(1, columns, squeeze=False)[0]
-    for axis in axes:
-        axis.spines[["top", "right"]].set_visible(False)
-    return figure, axes
-
-
-def _svg(figure: "Figure") -> str:
-    """The figure as an SVG element; the same figure gives the same text."""
-    text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None})
-    svg = text.getvalue()
-    return svg[svg.index("<svg") :]
-
-
-def _every(lines: int, points: int) -> int:
-    """Every which point to draw."""
-    return max(1, lines * points // _MOST_POINTS)
-
-
-# -- map ----------------------------------------------------------------------------------------------------------
-
-
-def _map(result: Result) -> Plot:
-    """A panel for each storey that somebody was on."""
-    exercise = result.played.exercise
-    levels = _levels(result)
-    panels = min(len(levels), 4)
-    figure, axes = _figure(panels, width=10.0 if panels > 1 else 8.0, height=5.4 if panels < 3 else 4.2)
-    for axis, level in zip(axes, levels, strict=False):
-        for outline in exercise.plan.get(level, ()):
-            axis.plot(outline[:, 0], outline[:, 1], color="#6e7781", linewidth=0.8, zorder=1)
-        for compared in result.compared.values():
-            _draw_way(axis, compared, level, result)
-        title = f"floor {level}" if len(exercise.storeys_m) > 1 else ""
-        axis.set(title=title, xlabel="east m", ylabel="north m")
-        axis.set_aspect("equal", adjustable="datalim")
-    _map_legend(axes[0])
-    crowd = "" if len(result.compared) <= _FEW else " Reports are not drawn for so many."
-    return Plot(
-        "Map",
-        _svg(figure),
-        "Fused ways (blue) over true ones (grey); crosses are where the command post was told a soldier to be."
-        + crowd,
-    )
-
-
-def _levels(result: Result) -> list[int]:
-    exercise = result.played.exercise
-    seen: set[int] = set()
-    for compared in result.compared.values():
-        floors = true_floors(compared.soldier.truth, compared.time_s, exercise)
-        seen |= {int(floor) for floor in floors[np.isfinite(floors)]}
-    return sorted(seen) or [0]
-
-
-def _draw_way(axis: "Axes", compared: Compared, level: int, result: Result) -> None:
-    """Truth and fused way while on this level (or between levels next to it)."""
-    exercise = result.played.exercise
-    step = _every(2 * len(result.compared), compared.time_s.size)
-    time_s = compared.time_s[::step]
-    truth = compared.truth_m[::step]
-    here = np.ones(time_s.size, dtype=bool)
-    if compared.soldier.truth.has_height and len(exercise.storeys_m) > 1:
-        here = exercise.floors(truth[:, 2]) == level
-    fused = compared.to_truth(compared.track.at(time_s)[:, :2])
-    for line, colour, width in ((truth[:, :2], _TRUTH, 3.0), (fused, _FUSED, 1.0)):
-        shown = np.where(here[:, None], line, np.nan)
-        axis.plot(shown[:, 0], shown[:, 1], color=colour, linewidth=width, solid_capstyle="round", zorder=2)
-    if here.any():
-        first = fused[np.argmax(here)]
-        axis.plot(*first, "o", color="#1a7f37", markersize=3.5, zorder=4)
-        if len(result.compared) <= _FEW:
-            _draw_reports(axis, compared, level, result)
-            axis.annotate(compared.soldier.id, first, fontsize=8, xytext=(3, 3), textcoords="offset points")
-
-
-def _draw_reports(axis: "Axes", compared: Compared, level: int, result: Result) -> None:
-    post = result.played.exercise.command_post
-    log = result.played.heard[post].reports.get(compared.soldier.id)
-    if log is None or not len(log):
-        return
-    told = log.told(result.played.start_ns)
-    here = np.isnan(told.floor) | (told.floor == level)
-    places = compared.to_truth(told.place_m[here])
-    axis.plot(places[:, 0], places[:, 1], "x", color=_REPORTS, markersize=3.5, markeredgewidth=0.8, zorder=3)
-
-
-def _map_legend(axis: "Axes") -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [
-        Line2D([], [], color=_TRUTH, linewidth=3.0, label="truth"),
-        Line2D([], [], color=_FUSED, linewidth=1.2, label="fused"),
-        Line2D([], [], color=_REPORTS, marker="x", linestyle="", label="told to the command post"),
-        Line2D([], [], color="#1a7f37", marker="o", linestyle="", markersize=4, label="first seen here"),
-    ]
-    axis.legend(handles=handles, fontsize=8, loc="best", framealpha=0.85)
 
 
 # -- errors -------------------------------------------------------------------------------------------------------
@@ -155,28 +47,34 @@ def _lengths(vectors: FloatArray) -> FloatArray:
 
 def _over_time(result: Result) -> Plot:
     curves = [(each.time_s, _lengths(each.errors_m)) for each in result.compared.values()]
-    figure, axes = _figure()
+    figure, axes = new_figure()
     _draw_errors(axes[0], curves, list(result.compared))
     picture = result.pictures[result.played.exercise.command_post]
     if picture.time_s.size:
         middle, _ = _binned(picture.time_s, picture.against_truth_m)
-        axes[0].plot(*middle, color=_PICTURE, linewidth=1.6, label="picture at the command post, median")
-    axes[0].set(xlabel="time s", ylabel="error m", ylim=(0, None))
-    axes[0].legend(fontsize=8, ncols=3)
-    return Plot("Error over time", _svg(figure), _error_caption(result, "second"))
+        label = "picture at the command post, median"
+        axes[0].plot(*middle, color=PICTURE, linewidth=1.4, linestyle="--", label=label)
+    axes[0].set(xlabel="time (s)", ylabel="error (m)", ylim=(0, None))
+    _add_legend(figure)
+    return Plot("Error over time", svg_of(figure), _error_caption(result, "second"))
 
 
 def _over_distance(result: Result) -> Plot:
     curves = [(each.walked_m, _lengths(each.errors_m)) for each in result.compared.values()]
-    figure, axes = _figure()
+    figure, axes = new_figure()
     _draw_errors(axes[0], curves, list(result.compared))
-    axes[0].set(xlabel="way gone m", ylabel="error m", ylim=(0, None), xlim=(0, None))
-    axes[0].legend(fontsize=8, ncols=3)
-    return Plot("Error against distance", _svg(figure), _error_caption(result, "metre"))
+    axes[0].set(xlabel="way gone (m)", ylabel="error (m)", ylim=(0, None), xlim=(0, None))
+    _add_legend(figure)
+    return Plot("Error against distance", svg_of(figure), _error_caption(result, "metre"))
+
+
+def _add_legend(figure: "Figure") -> None:
+    """Below the axes, where it hides nothing."""
+    figure.legend(fontsize=8, loc="outside lower center", ncols=9, frameon=False)
 
 
 def _error_caption(result: Result, unit: str) -> str:
-    if len(result.compared) <= _FEW:
+    if len(result.compared) <= FEW:
         return "Horizontal error of the fused position of each soldier."
     return (
         f"Horizontal error of the fused positions: median and 95th percentile of all soldiers by the {unit}."
@@ -184,14 +82,15 @@ def _error_caption(result: Result, unit: str) -> str:
 
 
 def _draw_errors(axis: "Axes", curves: list[tuple[FloatArray, FloatArray]], names: list[str]) -> None:
-    if len(curves) <= _FEW:
-        step = _every(len(curves), max(curve[0].size for curve in curves))
+    if len(curves) <= FEW:
+        step = every(len(curves), max(curve[0].size for curve in curves))
+        colours = colours_of(names)
         for (along, error), name in zip(curves, names, strict=True):
-            axis.plot(along[::step], error[::step], linewidth=1.0, label=name)
+            axis.plot(along[::step], error[::step], linewidth=1.0, label=name, color=colours[name])
         return
     middle, high = _binned(*(np.concatenate(columns) for columns in zip(*curves, strict=True)))
-    axis.fill_between(middle[0], 0.0, high[1], color=_FUSED, alpha=0.15, linewidth=0, label="95 % below")
-    axis.plot(*middle, color=_FUSED, linewidth=1.6, label="fused, median")
+    axis.fill_between(middle[0], 0.0, high[1], color=FUSED, alpha=0.15, linewidth=0, label="95 % below")
+    axis.plot(*middle, color=FUSED, linewidth=1.6, label="fused, median")
 
 
 def _binned(
@@ -217,22 +116,27 @@ def _distributions(result: Result) -> Plot:
     ]
     fused = [_lengths(each.errors_m) for each in result.compared.values()]
     picture = result.pictures[played.exercise.command_post]
-    figure, axes = _figure(2)
+    figure, axes = new_figure(2)
+    most_m = 0.0
     for errors, colour, label in (
-        (stepped, _STEPS, "foot steps alone (fitted)"),
-        (fused, _FUSED, "fused"),
-        ([picture.against_truth_m], _PICTURE, "picture at the command post"),
+        (stepped, STEPS, "foot steps alone (fitted)"),
+        (fused, FUSED, "fused"),
+        ([picture.against_truth_m], PICTURE, "picture at the command post"),
     ):
-        _draw_cdf(axes[0], np.concatenate(errors or [np.empty(0)]), colour, label)
-    _draw_cdf(axes[1], picture.age_s, _PICTURE, "age of what the command post knows")
-    axes[0].set(xlabel="error m", ylabel="share of the time %", ylim=(0, 100), xlim=(0, None))
-    axes[1].set(xlabel="age s", ylabel="share of the time %", ylim=(0, 100), xlim=(0, None))
+        values = np.concatenate(errors or [np.empty(0)])
+        most_m = max(most_m, float(np.percentile(values, 99))) if values.size else most_m
+        _draw_cdf(axes[0], values, colour, label)
+    _draw_cdf(axes[1], picture.age_s, PICTURE, "age of what the command post knows")
+    axes[0].set(
+        xlabel="error (m)", ylabel="share of the time (%)", ylim=(0, 100), xlim=(0, 1.2 * most_m or None)
+    )
+    axes[1].set(xlabel="age (s)", ylabel="share of the time (%)", ylim=(0, 100), xlim=(0, None))
     for axis in axes:
         axis.legend(fontsize=8, loc="lower right")
     return Plot(
         "How often how wrong",
-        _svg(figure),
-        "Distributions over all soldiers and times, hop by hop; dashes at 95 %.",
+        svg_of(figure),
+        "Distributions over all soldiers and times, hop by hop, without the worst hundredth; dashes at 95 %.",
     )
 
 
@@ -253,27 +157,27 @@ def _radio(result: Result) -> Plot | None:
     if not nets:
         return None
     used = {str(row["net"]): float(row["bits_per_s"]) for row in result.figures["nets"]}
-    busiest = sorted(nets, key=lambda net: -used[net.profile.name] / net.profile.rate_bits_per_s)[:_FEW]
-    figure, axes = _figure(2)
+    busiest = sorted(nets, key=lambda net: -used[net.profile.name] / net.profile.rate_bits_per_s)[:FEW]
+    figure, axes = new_figure(2)
     for net in busiest:
         seconds, bits = _traffic(result, net.profile.name, net.members)
         axes[0].plot(seconds, bits, linewidth=1.1, label=net.profile.name)
         for begin_s, end_s in net.outages_s:
             axes[0].axvspan(begin_s, end_s, color="#cf222e", alpha=0.1, linewidth=0)
-    axes[0].set(xlabel="time s", ylabel="bit/s on the air", ylim=(0, None))
+    axes[0].set(xlabel="time (s)", ylabel="on the air (bit/s)", ylim=(0, None))
     axes[0].legend(fontsize=8, ncols=2)
     _draw_use(axes[1], [(net.profile.name, net.profile.rate_bits_per_s) for net in busiest], used)
-    more = f" The busiest {_FEW} of {len(nets)} nets." if len(nets) > _FEW else ""
+    more = f" The busiest {FEW} of {len(nets)} nets." if len(nets) > FEW else ""
     caption = f"Bits on the air with the links' headers, averaged over {_WINDOW_S:g} s; outages in red."
-    return Plot("Radio use", _svg(figure), caption + more)
+    return Plot("Radio use", svg_of(figure), caption + more)
 
 
 def _draw_use(axis: "Axes", rates: Sequence[tuple[str, float]], used: Mapping[str, float]) -> None:
     names = [name for name, _ in rates]
     axis.barh(names, [rate for _, rate in rates], color="#eaeef2", label="the net's rate")
-    axis.barh(names, [used[name] for name in names], color=_FUSED, height=0.5, label="used, average")
-    axis.invert_yaxis()
-    axis.set(xlabel="bit/s")
+    axis.barh(names, [used[name] for name in names], color=FUSED, height=0.5, label="used, average")
+    axis.set_ylim(max(len(names), 3) - 0.5, -0.5)  # from the top down, and bars of a net or two not too thick
+    axis.set(xlabel="rate (bit/s)")
     axis.legend(fontsize=8)
 
 

@@ -2,13 +2,15 @@
 
 import html
 import json
+from collections.abc import Sized
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from proving_ground.exercises.picture import FALSE_M
-from proving_ground.exercises.plots import Plot, plots_of
+from proving_ground.exercises.plots import plots_of
+from proving_ground.exercises.plotting import Plot
 from proving_ground.exercises.result import Result, ages_of
 from proving_ground.exercises.tables import TABLES, html_table, summary
 from proving_ground.exercises.usage import by_service
@@ -58,11 +60,17 @@ def _circumstances(result: Result) -> str:
     sources = sorted({soldier.run.source for soldier in exercise.soldiers if soldier.run.source})
     how = "in one process, in event time"
     if figures["mode"] == "processes":
-        how = f"{figures['processes']} processes at {figures['speed']:g} times real time"
+        pace = "in real time" if figures["speed"] == 1.0 else f"at {figures['speed']:g} times real time"
+        how = f"{figures['processes']} processes {pace}"
     return html.escape(
-        f"{len(exercise.soldiers)} soldiers, {len(exercise.hubs)} posts, {len(exercise.nets)} radio nets; "
+        f"{_count(exercise.soldiers, 'soldier')}, {_count(exercise.hubs, 'post')}, "
+        f"{_count(exercise.nets, 'radio net')}; "
         f"{figures['duration_s']:.0f} s; {how}. Walks: {'; '.join(sources) or 'unnamed'}."
     )
+
+
+def _count(things: Sized, name: str) -> str:
+    return f"{len(things)} {name}{'' if len(things) == 1 else 's'}"
 
 
 def _cards(result: Result) -> str:

@@ -1,12 +1,13 @@
 """Puts an exercise on stage: a router per computer, the radio nets, every service as a real process, observers.
 
 Nothing but the radio nets joins the computers: each has a router of its own, so what the command post shows has
-come over the air. Processes start in waves, as many at a time as the machine's processors can bear; gateways last.
+come over the air. As many processes are starting at a time as the machine's processors can bear; gateways last.
 """
 
 import os
 import socket
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -40,10 +41,10 @@ from proving_ground.exercises.truth_record import record_truth
 GATEWAY = "sensor-gateway"
 SOLDIER_SERVICES = ("pdr-engine", "fusion", "sa-hub")
 POST_SERVICES = ("sa-hub",)
-_READY_TIMEOUT_S = 120.0  # for one wave
-_WAVE_PER_PROCESSOR = 3
+_READY_TIMEOUT_S = 120.0  # for one process
+_AT_ONCE_PER_PROCESSOR = 3
 # Host seconds for the gateways to start before the walks do: a base, each one's imports, each second of a unit.
-_LEAD_S, _LEAD_PER_GATEWAY_S, _LEAD_PER_PLAYED_S = 5.0, 2.0, 1.6e-3
+_LEAD_S, _LEAD_PER_GATEWAY_S, _LEAD_PER_PLAYED_S = 5.0, 1.0, 2e-4
 _LEAD_TRIES = (1.0, 3.0, 9.0)
 _LAST_CALL_S = 3.0  # host seconds before the walks: who is not there then will not be
 
@@ -191,37 +192,34 @@ class Stage:
             for computer in self.exercise.computers
             for service in self._services(computer)
         ]
-        self._start_waves(wanted, stop, on_progress, lambda: False)
+        self._start(wanted, stop, on_progress, lambda: False)
 
-    def _start_waves(
+    def _start(
         self,
         wanted: Sequence[tuple[str, str]],
         stop: Stop,
         on_progress: OnProgress,
         too_late: Callable[[], bool],
     ) -> bool:
-        """Wave after wave, each awaited; False if stopped, or too late."""
-        size = _WAVE_PER_PROCESSOR * (os.cpu_count() or 1)
-        for first in range(0, len(wanted), size):
-            wave = wanted[first : first + size]
-            for computer, service in wave:
-                if too_late():
-                    return False
-                self.spawn(computer, service)
-            if not self._await(wave, stop, too_late):
-                return False
-            on_progress(len(self.processes.pids), self.process_count)
-        return not too_late()
-
-    def _await(self, wave: Sequence[tuple[str, str]], stop: Stop, too_late: Callable[[], bool]) -> bool:
-        deadline = time.monotonic() + _READY_TIMEOUT_S
-        while missing := [f"{c}/{s}" for c, s in wave if s not in self.observers.alive(c)]:
-            self.processes.check()
-            if time.monotonic() > deadline:
-                raise StageError(f"not running after {_READY_TIMEOUT_S:g} s: {', '.join(missing)}")
+        """Start them, the next as soon as one is there; False if stopped, or too late."""
+        waiting, starting = deque(wanted), dict[tuple[str, str], float]()
+        while waiting or starting:
+            while waiting and len(starting) < _AT_ONCE_PER_PROCESSOR * (os.cpu_count() or 1):
+                starting[waiting[0]] = time.monotonic() + _READY_TIMEOUT_S
+                self.spawn(*waiting.popleft())
             if too_late() or stop.wait(0.05):
                 return False
-        return True
+            self._note_ready(starting)
+            on_progress(len(self.processes.pids) - len(starting), self.process_count)
+        return not too_late()
+
+    def _note_ready(self, starting: dict[tuple[str, str], float]) -> None:
+        """Strike out what runs; StageError on what does not by its deadline."""
+        self.processes.check()
+        for computer, service in [one for one in starting if one[1] in self.observers.alive(one[0])]:
+            del starting[computer, service]
+        if missing := [f"{c}/{s}" for (c, s), at in starting.items() if time.monotonic() > at]:
+            raise StageError(f"not running after {_READY_TIMEOUT_S:g} s: {', '.join(missing)}")
 
     def start_walks(self, stop: Stop, on_progress: OnProgress = lambda _done, _of: None) -> None:
         """Start the gateways; all walks begin at ``start_ns`` of event time, a whole second.
@@ -235,7 +233,7 @@ class Stage:
             self._set_start(least_s * patience)
             for soldier in self.exercise.soldiers:
                 self._write_gateway(soldier)
-            if self._start_waves(gateways, stop, on_progress, self._is_too_late) or stop.is_set():
+            if self._start(gateways, stop, on_progress, self._is_too_late) or stop.is_set():
                 self._begin()
                 return
             for computer, service in gateways:
@@ -265,9 +263,10 @@ class Stage:
         """Do what is to break by now, and mend what was broken long enough."""
         self._faults.play(self.elapsed_s)
 
-    def close_watch(self) -> None:
-        """The exercise is over: take in what has been said, and record the truth beside it."""
+    def end(self) -> None:
+        """The exercise is over: take in what has been said, let everybody go, and record the truth beside it."""
         self.observers.close()
+        self.processes.stop()  # before the scoring, which wants the processors
         if self._recorder is not None:
             record_truth(self._recorder, self.exercise, self.start_ns)
 

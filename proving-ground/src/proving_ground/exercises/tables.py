@@ -48,6 +48,7 @@ def print_scores(result: Result) -> None:
 
 def _terminal_table(rows: Sequence[Mapping[str, Any]], title: str) -> Table:
     table = Table(title=title, title_justify="left")
+    rows = known(rows)
     for column in rows[0] if rows else ():
         table.add_column(heading(column), justify="left" if column == next(iter(rows[0])) else "right")
     for row in rows:
@@ -66,6 +67,12 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             values = [row[column] for row in rows if row[column] is not None]
             found[-1][column] = float(figure(values)) if values else None
     return found
+
+
+def known(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """The rows without the columns of which nobody knows anything, as floors where there are none."""
+    kept = [column for column in (rows[0] if rows else ()) if any(row[column] is not None for row in rows)]
+    return [{column: row[column] for column in kept} for row in rows]
 
 
 def heading(column: str) -> str:
@@ -89,6 +96,7 @@ def html_table(rows: Sequence[Mapping[str, Any]]) -> str:
     """The same as HTML."""
     if not rows:
         return "<p>None.</p>"
+    rows = known(rows)
     head = "".join(f"<th>{html.escape(heading(column))}</th>" for column in rows[0])
     body = "".join(
         "<tr>" + "".join(f"<td>{html.escape(cell(v))}</td>" for v in row.values()) + "</tr>" for row in rows

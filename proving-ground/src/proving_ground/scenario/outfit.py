@@ -37,7 +37,7 @@ _ON_SHOULDER = Mounting(np.array([0.0, 0.15, 0.45]))
 _ON_CHEST = Mounting(np.array([0.12, 0.0, 0.3]))
 _FEET = ("left_foot", "right_foot")
 # Streams of random numbers of one soldier; the person and the motion take 0 and 1.
-_IMU, _GNSS, _PRESSURE, _CAMERA, _RANGES = 10, 20, 30, 40, 50
+_IMU, _GNSS, _PRESSURE, _CAMERA, _RANGES, _MOUNTING = 10, 20, 30, 40, 50, 60
 
 
 @dataclass(frozen=True)
@@ -93,8 +93,16 @@ class Outfit:
         rng = self._rng(_IMU, list(self._imus).index(imu.place))
         quality = imu_class(imu.quality)
         return measure_imu(
-            self._part(imu.place), self.motion.duration_s, mounting_of(imu), quality, magnetics, rng
+            self._part(imu.place), self.motion.duration_s, self._mounting(imu), quality, magnetics, rng
         )
+
+    def _mounting(self, imu: Imu) -> Mounting:
+        """Where a unit sits on this soldier's foot or body: nobody wears it quite as the next one does."""
+        laces = INSTEP_M if imu.place in _FEET else np.zeros(3)
+        offset = laces if imu.offset_m is None else np.array(imu.offset_m)
+        rng = self._rng(_MOUNTING, list(self._imus).index(imu.place))
+        roll, pitch, yaw = rng.normal(imu.mounting_deg, imu.askew_deg)
+        return Mounting(offset, Rotation.from_euler("ZYX", [yaw, pitch, roll], degrees=True))
 
     def _gnss(self) -> GnssSeries | None:
         kind = self.soldier.kit.gnss
@@ -147,7 +155,7 @@ class Outfit:
             ]
             series.append(self._ranged(self.motion.torso, _ON_SHOULDER, peers, "soldiers", 0))
         if kit.foot_ranging and all(foot in self._imus for foot in _FEET):
-            left, right = (mounting_of(self._imus[foot]) for foot in _FEET)
+            left, right = (self._mounting(self._imus[foot]) for foot in _FEET)
             peers = [Peer(f"{self.soldier.id}/right_foot", self.motion.right_foot, right)]
             series.append(self._ranged(self.motion.left_foot, left, peers, "feet", 1))
         return merged(series) if series else None
@@ -158,14 +166,6 @@ class Outfit:
         between = Ranging(peers, self.surroundings.walls, self.surroundings.floors_m)
         rng = self._rng(_RANGES, stream)
         return measure_ranges(motion, self.motion.duration_s, mounting, RANGE_CLASSES[kind], between, rng)
-
-
-def mounting_of(imu: Imu) -> Mounting:
-    """Where a unit sits on foot or body."""
-    laces = INSTEP_M if imu.place in _FEET else np.zeros(3)
-    offset = laces if imu.offset_m is None else np.array(imu.offset_m)
-    roll, pitch, yaw = imu.mounting_deg
-    return Mounting(offset, Rotation.from_euler("ZYX", [yaw, pitch, roll], degrees=True))
 
 
 def merged(series: list[RangeSeries]) -> RangeSeries:

@@ -8,7 +8,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from bootprint.messages import Vector3
 from fusion.config import AlignConfig
@@ -74,7 +73,7 @@ def fit_rigid(track: Array, places: Array, covariance: Array) -> RigidFit:
     Closed-form weighted Procrustes for the turn (Umeyama 1991 in the plane, no scale), then Gauss-Newton steps of
     generalised least squares, whose normal matrix is the covariance's inverse. Needs two distinct points.
     """
-    factor = cho_factor(covariance, lower=True)
+    information = np.linalg.inv(covariance)
     weights = 1.0 / np.diag(covariance)
     pivot = weights @ track / weights.sum()
     target = weights @ places / weights.sum()
@@ -82,12 +81,12 @@ def fit_rigid(track: Array, places: Array, covariance: Array) -> RigidFit:
     for _ in range(3):
         rows = _design(track - pivot, yaw)
         residual = places - target - (track - pivot) @ _rotation(yaw).T
-        weighted = cho_solve(factor, rows.reshape(len(track), -1)).reshape(rows.shape)
+        weighted = np.einsum("kl,lai->kai", information, rows)
         normal = np.einsum("kai,kaj->ij", rows, weighted)
         step = np.linalg.solve(normal, np.einsum("kai,ka->i", weighted, residual))
         target, yaw = target + step[:2], yaw + float(step[2])
     residual = places - target - (track - pivot) @ _rotation(yaw).T
-    chi_square = float(np.sum(residual * cho_solve(factor, residual)))
+    chi_square = float(np.sum(residual * (information @ residual)))
     return RigidFit(pivot, target, yaw, np.linalg.inv(normal), residual, chi_square)
 
 

@@ -61,10 +61,19 @@ class Boots:
         foot = self.feet[place]
         if math.hypot(*pose.displacement_m) > self._config.boots.max_speed_m_s * _LONGEST_SWING_S:
             self._counters["implausible_poses"] += 1
+        elif self._was_left_behind(foot, pose.time_ns):
+            self._counters["poses_after_silence"] += 1
         elif not foot.note_pose(pose):
             self._counters["poses_without_step"] += 1
         elif foot.active:
             self._sample(foot, pose.time_ns)
+
+    def _was_left_behind(self, foot: Foot, now_ns: int) -> bool:
+        """Whether the other foot walked on while this one was silent: only its next step tells what it has missed.
+
+        Its poses go on from where it was then. They would pull the body back there.
+        """
+        return not foot.is_heard(now_ns, self._config.silence.coasting_s) and bool(self._others(foot, now_ns))
 
     def _begin(self, foot: Foot, step: FootStep) -> None:
         """The first foot to step begins the frame: there, exactly."""
@@ -80,7 +89,10 @@ class Boots:
         untracked_s = foot.untracked_s(step, entry.unseen)
         self._counters["lost_steps"] += entry.lost
         self._counters["foot_restarts"] += entry.anew
-        if untracked_s > silence.rejoin_s and self._others(foot, step.time_ns):
+        forgiven_s = (
+            silence.coasting_s if step.realigned else silence.rejoin_s
+        )  # a broken step tells no way at all
+        if untracked_s > forgiven_s and self._others(foot, step.time_ns):
             self._drop(foot)
         elif foot.active and untracked_s > 0.0:
             moved, turned = silence.drift_m_s * untracked_s, silence.turn_rad_sqrt_s
@@ -144,7 +156,10 @@ class Boots:
     def _couple(self, foot: Foot, step: FootStep) -> None:
         """Hold the feet together: once per pair of steps softly, and by the bound whenever it is passed."""
         foot.stepped = True
+        coasting_s = self._config.silence.coasting_s
         for other in self._others(foot, step.time_ns):
+            if other.is_ahead(step.time_ns, coasting_s):
+                continue  # the step comes so late that the other foot stands where this one has yet to go
             passing = Passing(other.block, foot.block, step.displacement_m, step.heading_change_rad)
             if other.stepped:
                 foot.stepped = other.stepped = False

@@ -103,7 +103,7 @@ class SilenceConfig(Config, frozen=True):
     drift_m_s: Positive = 1.5  # how fast an unobserved soldier's position becomes unknown
     turn_rad_sqrt_s: Positive = 0.3  # the same for the heading
     rejoin_s: Positive = 5.0  # a foot unseen for longer has to find its place beside the other again
-    patience_s: Positive = 2.0  # ticks and other sources overrule silent feet only after this
+    patience_s: Positive = 2.0  # so long silent feet are waited for, once; then others carry time on
 
 
 class FusionConfig(Config, frozen=True):

@@ -112,6 +112,10 @@ class Foot:
         """Whether a message of this foot is not older than ``within_s``."""
         return self.heard_ns is not None and now_ns - self.heard_ns <= within_s * NS_PER_S
 
+    def is_ahead(self, time_ns: int, by_s: float) -> bool:
+        """Whether this foot has been heard more than ``by_s`` after that time."""
+        return self.heard_ns is not None and self.heard_ns - time_ns > by_s * NS_PER_S
+
     def untracked_s(self, step: FootStep, unseen: int) -> float:
         """How long this foot went unobserved up to the end of ``step``; half a second an unseen step at least.
 

@@ -1,18 +1,17 @@
 """The low-rate filter: one state, one covariance, one way to update it, one gate.
 
-filterpy's `KalmanFilter` keeps x and P and does the algebra (Joseph form); what is nonlinear (composing steps,
-wrapping angles) is done here around it, and its ``inv`` is replaced by a Cholesky solve.
+Kalman's algebra with Joseph's form of the update (Bucy and Joseph 1968), around it what
+is nonlinear: composing steps, wrapping angles. numpy alone: a library's filter would bring scipy.stats into every
+fusion, for six lines.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
-from scipy.linalg import cho_factor, cho_solve
-from scipy.special import chdtri
 
 from bootprint.geodesy import wrap_angle
 from bootprint.messages import FootStep, Vector3
+from fusion.chi_square import chi_square_quantile
 from fusion.models import foot_step
 from fusion.state import FOOT_SIZE, Array, FootBlock, Layout
 from fusion.transform import RigidTransform
@@ -47,36 +46,18 @@ class Measurement:
 
 def invert_spd(matrix: Array) -> Array:
     """Inverse of a symmetric positive definite matrix by Cholesky; LinAlgError if it is none."""
-    result: Array = cho_solve(cho_factor(matrix, lower=True), np.eye(matrix.shape[0]))
+    root = np.linalg.inv(np.linalg.cholesky(matrix))
+    result: Array = root.T @ root
     return result
 
 
-def chi_square_quantile(probability: float, degrees: int) -> float:
-    """The value that a chi-square variable stays below with this probability."""
-    return float(chdtri(degrees, 1.0 - probability))
-
-
 class StateFilter:
-    """State and covariance of all feet, in the frame of `fusion.state`."""
+    """State (n,) and covariance (n, n) of all feet, in the frame of `fusion.state`; read them, never write."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
-        self._kalman = KalmanFilter(dim_x=layout.size, dim_z=3)
-        self._kalman.x = np.zeros(layout.size)
-        self._kalman.P = np.zeros((layout.size, layout.size))
-        self._kalman.inv = invert_spd
-
-    @property
-    def state(self) -> Array:
-        """State (n,); treat as read-only."""
-        state: Array = self._kalman.x
-        return state
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance (n, n); treat as read-only."""
-        covariance: Array = self._kalman.P
-        return covariance
+        self.state: Array = np.zeros(layout.size)
+        self.covariance: Array = np.zeros((layout.size, layout.size))
 
     def propagate(self, block: FootBlock, step: FootStep, noise: Array) -> None:
         """Compose a step (its covariance (4, 4) in the step's axes) onto a foot."""
@@ -86,22 +67,30 @@ class StateFilter:
         spread = foot_step.step_jacobian(pose)
         process[block.all, block.all] = spread @ noise @ spread.T
         state[block.all] = foot_step.compose(pose, step.displacement_m, step.heading_change_rad)
-        self._kalman.predict(F=transition, Q=process)
-        self._kalman.x = state  # predict() has moved x linearly; the composition is exact
+        self.state = state
+        self.covariance = transition @ self.covariance @ transition.T + process
 
     def update(self, measurement: Measurement) -> Innovation:
         """Gate, then update; the innovation tells what happened."""
         innovation = self._innovation(measurement)
         if innovation.accepted:
-            jacobian = measurement.jacobian
-            self._kalman.update(measurement.residual + jacobian @ self.state, R=measurement.noise, H=jacobian)
+            self._correct(measurement)
             self._settle()
         return innovation
+
+    def _correct(self, measurement: Measurement) -> None:
+        """The gain, and with it state and covariance (Joseph's form: right for any gain, and never indefinite)."""
+        jacobian, noise = measurement.jacobian, measurement.noise
+        shared = self.covariance @ jacobian.T
+        gain = shared @ invert_spd(jacobian @ shared + noise)
+        kept = np.eye(self.layout.size) - gain @ jacobian
+        self.state = self.state + gain @ measurement.residual
+        self.covariance = kept @ self.covariance @ kept.T + gain @ noise @ gain.T
 
     def _innovation(self, measurement: Measurement) -> Innovation:
         noise = measurement.noise if measurement.gate_noise is None else measurement.gate_noise
         covariance = measurement.jacobian @ self.covariance @ measurement.jacobian.T + noise
-        squared = float(measurement.residual @ cho_solve(cho_factor(covariance), measurement.residual))
+        squared = float(measurement.residual @ invert_spd(covariance) @ measurement.residual)
         probability = measurement.gate_probability
         degrees = measurement.residual.size
         accepted = probability is None or squared <= chi_square_quantile(probability, degrees)
@@ -109,21 +98,21 @@ class StateFilter:
 
     def _settle(self) -> None:
         for block in self.layout.blocks:
-            self._kalman.x[block.yaw] = wrap_angle(float(self._kalman.x[block.yaw]))
-        self._kalman.P = 0.5 * (self._kalman.P + self._kalman.P.T)
+            self.state[block.yaw] = wrap_angle(float(self.state[block.yaw]))
+        self.covariance = 0.5 * (self.covariance + self.covariance.T)
 
     def widen(self, block: FootBlock, position_m2: float, yaw_rad2: float) -> None:
         """Add variance to one foot: something unobserved happened to it alone."""
         for index in range(block.start, block.start + 3):
-            self._kalman.P[index, index] += position_m2
-        self._kalman.P[block.yaw, block.yaw] += yaw_rad2
+            self.covariance[index, index] += position_m2
+        self.covariance[block.yaw, block.yaw] += yaw_rad2
 
     def widen_together(self, position_covariance: Array, yaw_rad2: float = 0.0) -> None:
         """Add covariance (3, 3), m², and a yaw variance to all feet alike: the whole body was misjudged."""
         for one in self.layout.blocks:
             for other in self.layout.blocks:
-                self._kalman.P[one.position, other.position] += position_covariance
-                self._kalman.P[one.yaw, other.yaw] += yaw_rad2
+                self.covariance[one.position, other.position] += position_covariance
+                self.covariance[one.yaw, other.yaw] += yaw_rad2
 
     def join(self, block: FootBlock, beside: FootBlock, pose: Array, noise: Array, alike: bool) -> None:
         """Set a foot to ``pose`` (4,), found relative to the foot ``beside`` it, give or take ``noise`` (4, 4).
@@ -145,8 +134,8 @@ class StateFilter:
         own = self.covariance[beside.all, beside.all].copy()
         for one, other, share in shares:
             covariance[one.all, other.all] = own + share * noise
-        self._kalman.P = covariance
-        self._kalman.x[block.all] = pose
+        self.covariance = covariance
+        self.state[block.all] = pose
 
     def transform(self, move: RigidTransform) -> None:
         """Carry the whole state into another frame; the move's own error becomes common to all feet."""
@@ -157,8 +146,8 @@ class StateFilter:
             jacobian[block.all, block.all] = move.pose_jacobian()
             state[block.all] = move.pose(self.state[block.all])
             common[block.all] = move.error_jacobian(self._position(block))
-        self._kalman.x = state
-        self._kalman.P = jacobian @ self.covariance @ jacobian.T + common @ move.covariance @ common.T
+        self.state = state
+        self.covariance = jacobian @ self.covariance @ jacobian.T + common @ move.covariance @ common.T
 
     def _position(self, block: FootBlock) -> Vector3:
         east, north, up = (float(value) for value in self.state[block.position])

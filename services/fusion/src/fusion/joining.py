@@ -12,8 +12,8 @@ import numpy as np
 from bootprint.geodesy import wrap_angle
 from bootprint.messages import Vector3
 from fusion.alignment import fit_rigid
+from fusion.chi_square import chi_square_quantile
 from fusion.config import FusionConfig
-from fusion.filter import chi_square_quantile
 from fusion.state import Array
 from fusion.transform import RigidTransform
 

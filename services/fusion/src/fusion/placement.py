@@ -23,8 +23,8 @@ from bootprint.clock import NS_PER_S
 from bootprint.geodesy import LocalFrame, wrap_angle
 from bootprint.messages import Vector3
 from fusion.alignment import RigidFit, Walk, fit_rigid
+from fusion.chi_square import chi_square_quantile
 from fusion.config import AlignConfig, GnssConfig, StartConfig
-from fusion.filter import chi_square_quantile
 from fusion.state import Array
 from fusion.transform import RigidTransform
 

@@ -155,11 +155,16 @@ class LivePulse:
         return self._first_ns + self._silence_ns if self._ticked_ns == NEVER else self._ticked_ns
 
     def sure_before_ns(self) -> int:
-        """The window behind the drivers; the patience behind the present once they are silent."""
-        window_ns = self.driven_ns - self._window_ns
+        """The window behind the drivers, or behind the present once their silence has outlasted the patience.
+
+        Patience is the doubt whether they are silent or delayed: it is over when it has been waited for. Before
+        they were ever heard, the present is the host's clock, which may be wrong by as much.
+        """
         if self._silence_ns <= self._patience_ns:
-            return window_ns
-        return max(window_ns, self._present_ns - self._patience_ns)
+            return self.driven_ns - self._window_ns
+        if self.driven_ns == NEVER:
+            return self._present_ns - self._patience_ns
+        return self._present_ns - self._window_ns
 
     def restart(self, time_ns: int) -> int:
         """Follow the drivers back."""

@@ -6,7 +6,8 @@ when either
 - every *expected* source has gone past it. A source's watermark is the stamp of its last message without a hole in
   the sequence before it, so a message that overtook another does not move it; or
 - the `Pulse` says that nobody is waited for any longer: the newest stamp of a driver is ``window`` later, or the
-  drivers have been silent for ``patience``. (In a replay as fast as possible it never says so.)
+  drivers have been silent for longer than the ``patience``: then it is the window behind the present that counts,
+  until one of them speaks again. (In a replay as fast as possible it never says so.)
 
 So the order in which expected sources arrive does not matter within the window (what nobody expects may find that
 it was not waited for), and others (a receiver that is quicker than the foot filter) wait for the feet. Stamps that

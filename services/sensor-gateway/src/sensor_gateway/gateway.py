@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
-from typing import ParamSpec, Protocol, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, Protocol, TypeVar
 
 from bootprint.bus import Envelope
 from bootprint.errors import ConfigError
@@ -16,10 +16,10 @@ from bootprint.figures import Figures
 from bootprint.service import Context, Part
 from sensor_gateway import settings as config
 from sensor_gateway.host_utc import HostUtc
-from sensor_gateway.intake import Intake
 from sensor_gateway.sources.replay import Replay
-from sensor_gateway.sources.serial import SerialReader
-from sensor_gateway.sources.udp import UdpReader
+
+if TYPE_CHECKING:
+    from sensor_gateway.intake import Intake
 
 _JOIN_S = 2.0
 P = ParamSpec("P")
@@ -47,7 +47,7 @@ class LiveSource:
 
     name: str
     reader: Reader
-    intake: Intake
+    intake: "Intake"
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,10 +88,17 @@ class Gateway:
         if isinstance(source, config.ReplaySource):
             self._replayed.append(ReplayedSource(name, Replay(self._context, source)))
             return
+        from sensor_gateway.intake import (
+            Intake,
+        )  # brings the decoders' libraries, which a replay has no use for
+
         intake = Intake(self._context.identity, source, self._host)
         self._live.append(LiveSource(name, self._reader(source, intake), intake))
 
-    def _reader(self, source: config.SerialSource | config.UdpSource, intake: Intake) -> Reader:
+    def _reader(self, source: config.SerialSource | config.UdpSource, intake: "Intake") -> Reader:
+        from sensor_gateway.sources.serial import SerialReader
+        from sensor_gateway.sources.udp import UdpReader
+
         context = self._context
         on_bytes = self._posted(intake.feed)
         if isinstance(source, config.UdpSource):

@@ -4,7 +4,7 @@ from bootprint.service import Context, Part, Service
 
 
 def _build(context: Context) -> Part:
-    from sensor_gateway.gateway import build  # brings pymavlink and scipy; --help must not wait for them
+    from sensor_gateway.gateway import build  # --help must not wait for it
 
     return build(context)
 

@@ -45,6 +45,10 @@ class Imu(Config, kw_only=True, frozen=True):
     mounting_deg: Annotated[
         Triple, Meta(description="roll, pitch, yaw of its axes against forward-left-up of the foot or body")
     ] = (0.0, 0.0, 0.0)
+    askew_deg: Annotated[
+        Triple,
+        Meta(description="how differently each soldier wears it: sigma of roll, pitch, yaw, drawn once"),
+    ] = (10.0, 8.0, 10.0)  # as on the recorded feet (pyshoe-vicon, foot-gcp, gaitmap): 10, 8 and 9
     offset_m: Annotated[
         Triple | None,
         Meta(description="forward, left, up of the foot's ball or the belt (default: laces, belt)"),

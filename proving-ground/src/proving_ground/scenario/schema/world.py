@@ -215,7 +215,7 @@ class ClockJump(FaultTable, kw_only=True, frozen=True, tag="clock_jump"):
 
 
 class DiskFull(FaultTable, kw_only=True, frozen=True, tag="disk_full"):
-    """Nothing more can be written."""
+    """No file of the computer's services can grow; played by processes."""
 
     for_s: Length
 

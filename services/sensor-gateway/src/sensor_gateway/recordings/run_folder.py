@@ -5,6 +5,7 @@ sensor axes as mounted), ``pressure.csv``, ``gnss.csv``, ``camera_motion.csv``, 
 (``time_s,east_m,north_m[,up_m]``; way-points are enough). An empty cell is unknown.
 """
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +24,7 @@ from sensor_gateway.recordings.run import (
     Run,
     Truth,
 )
-from sensor_gateway.recordings.tables import Table, imu_series, peek_header, read_table
+from sensor_gateway.recordings.tables import Table, imu_series, peek_header, read_table, table_pieces
 
 PLACES = ("left_foot", "right_foot", "body")
 _IMU = ("time_s", "ax", "ay", "az", "gx", "gy", "gz")
@@ -31,8 +32,8 @@ _MAG = ("mx", "my", "mz")
 _GNSS = ("lat_deg", "lon_deg", "alt_m", "h_acc_m", "v_acc_m", "satellites", "speed_m_s", "course_deg")
 _CAMERA = ("start_time_s", "time_s", "tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad")
 _CAMERA_DOUBT = ("translation_sigma_m", "rotation_sigma_rad", "confidence_pct")
-_RANGES = "ranges"  # not only numbers, so it has a reader of its own
-_OPTIONAL_SENSORS = ("pressure", "gnss", "camera_motion", _RANGES)
+RANGES = "ranges"  # not only numbers, so it has a reader of its own
+_OPTIONAL_SENSORS = ("pressure", "gnss", "camera_motion", RANGES)
 _HEADERS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     **dict.fromkeys(PLACES, (_IMU, _MAG)),
     "pressure": (("time_s", "pressure_pa"), ()),
@@ -63,9 +64,9 @@ def _looks_like(path: Path) -> bool:
 
 def read_folder(folder: Path) -> list[Run]:
     """The folder's one run; RecordingError or ConfigError on anything wrong in it."""
-    notes = load_toml(folder / "run.toml", RunNotes) if (folder / "run.toml").exists() else RunNotes()
+    notes = _notes(folder)
     sensors = _sensors(folder, notes)
-    tables = {name: _read(folder / f"{name}.csv", name) for name in sensors if name != _RANGES}
+    tables = {name: _read(folder / f"{name}.csv", name) for name in sensors if name != RANGES}
     imus = {place: _imu(tables[place]) for place in PLACES if place in tables}
     truth = folder / "truth.csv"
     return [
@@ -75,18 +76,26 @@ def read_folder(folder: Path) -> list[Run]:
             path=folder,
             imus=imus,
             truth={"body": _truth(_read(truth, "truth"))} if truth.exists() else {},
-            pressure=_pressure(tables["pressure"]) if "pressure" in tables else None,
-            gnss=_gnss(tables["gnss"]) if "gnss" in tables else None,
-            camera=_camera(tables["camera_motion"]) if "camera_motion" in tables else None,
-            ranges=read_ranges(folder / f"{_RANGES}.csv") if _RANGES in sensors else None,
+            pressure=pressure_of(tables["pressure"]) if "pressure" in tables else None,
+            gnss=gnss_of(tables["gnss"]) if "gnss" in tables else None,
+            camera=camera_of(tables["camera_motion"]) if "camera_motion" in tables else None,
+            ranges=read_ranges(folder / f"{RANGES}.csv") if RANGES in sensors else None,
             origin=_origin(notes),
             source=notes.licence,
         )
     ]
 
 
-def _sensors(folder: Path, notes: RunNotes) -> list[str]:
+def _notes(folder: Path) -> RunNotes:
+    return load_toml(folder / "run.toml", RunNotes) if (folder / "run.toml").exists() else RunNotes()
+
+
+def sensors_of(folder: Path) -> list[str]:
     """The sensors to read: those named, which must be there, or all that are there."""
+    return _sensors(folder, _notes(folder))
+
+
+def _sensors(folder: Path, notes: RunNotes) -> list[str]:
     known = (*PLACES, *_OPTIONAL_SENSORS)
     there = [name for name in known if (folder / f"{name}.csv").exists()]
     if notes.sensors is None:
@@ -102,16 +111,27 @@ def _sensors(folder: Path, notes: RunNotes) -> list[str]:
 
 
 def _read(path: Path, name: str) -> Table:
-    """A table whose columns are all wanted and all known."""
     table = read_table(path)
+    _check_columns(table, name)
+    return table
+
+
+def read_pieces(folder: Path, name: str) -> Iterator[Table]:
+    """A sensor's table piece by piece; RecordingError, when it is come to, on what is wrong."""
+    for piece in table_pieces(folder / f"{name}.csv"):
+        _check_columns(piece, name)
+        yield piece
+
+
+def _check_columns(table: Table, name: str) -> None:
+    """All columns are there that are wanted, and all are known."""
     wanted, optional = _HEADERS[name]
     table.columns(*wanted)
     unknown = set(table.header[-1]) - {*wanted, *optional}
     if unknown:
         raise RecordingError(
-            f"{path}: unknown column {sorted(unknown)[0]!r} (known: {', '.join(wanted + optional)})"
+            f"{table.path}: unknown column {sorted(unknown)[0]!r} (known: {', '.join(wanted + optional)})"
         )
-    return table
 
 
 def _kind(places: set[str], has_camera: bool) -> Kind:
@@ -123,9 +143,15 @@ def _kind(places: set[str], has_camera: bool) -> Kind:
 
 
 def _imu(table: Table) -> ImuSeries:
+    raw = raw_imu_of(table)
+    return imu_series(table.path, raw.time_s, raw.accel_m_s2, raw.gyro_rad_s, raw.mag_ut)
+
+
+def raw_imu_of(table: Table) -> ImuSeries:
+    """An inertial unit's samples as they stand there, the unusable ones too."""
     data = table.columns(*_IMU)
     mag = table.columns(*_MAG) if _MAG[0] in table.header[-1] else None
-    return imu_series(table.path, data[:, 0], data[:, 1:4], data[:, 4:7], mag)
+    return ImuSeries(data[:, 0], data[:, 1:4], data[:, 4:7], mag)
 
 
 def _truth(table: Table) -> Truth:
@@ -135,15 +161,18 @@ def _truth(table: Table) -> Truth:
     return Truth(time_s, np.column_stack([track, table.optional("up_m")]))
 
 
-def _pressure(table: Table) -> PressureSeries:
+def pressure_of(table: Table) -> PressureSeries:
+    """A barometer's table as a series."""
     return PressureSeries(table.column("time_s"), table.column("pressure_pa"))
 
 
-def _gnss(table: Table) -> GnssSeries:
+def gnss_of(table: Table) -> GnssSeries:
+    """A receiver's table as a series."""
     return GnssSeries(table.column("time_s"), *(table.optional(name)[:, 0] for name in _GNSS))
 
 
-def _camera(table: Table) -> CameraSeries:
+def camera_of(table: Table) -> CameraSeries:
+    """A camera's table as a series."""
     translation = table.columns("tx_m", "ty_m", "tz_m")
     rotation = table.columns("rx_rad", "ry_rad", "rz_rad")
     doubts = (table.column(name) if name in table.header[-1] else None for name in _CAMERA_DOUBT)

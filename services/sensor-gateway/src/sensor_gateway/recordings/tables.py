@@ -5,9 +5,11 @@ import math
 import os
 import struct
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TextIO
 
 import numpy as np
 import structlog
@@ -18,6 +20,7 @@ from sensor_gateway.recordings.run import FloatArray, ImuSeries
 STANDARD_GRAVITY_M_S2 = 9.80665
 UT_PER_GAUSS = 100.0
 _PEEK_BYTES = 4096
+_PIECE_LINES = 500
 _MATLAB_HEADER_BYTES = 128
 
 
@@ -67,34 +70,62 @@ def peek_header(path: Path, rows: int = 1) -> tuple[tuple[str, ...], ...]:
 
 def read_table(path: Path, header_rows: int = 1) -> Table:
     """Read a CSV file of numbers; RecordingError names the line that is not."""
+    pieces = list(table_pieces(path, header_rows))
+    return Table(path, pieces[0].header, np.concatenate([piece.values for piece in pieces]))
+
+
+def table_pieces(path: Path, header_rows: int = 1) -> Iterator[Table]:
+    """The same piece by piece, each of some hundred rows: one at least, or RecordingError."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = csv.reader(file)
-            header = tuple(_cells(row) for _, row in zip(range(header_rows), rows, strict=False))
+            header = tuple(_cells(row) for row in csv.reader(islice(file, header_rows)))
             if len(header) < header_rows:
                 raise RecordingError(f"{path}: ends within its header")
-            values = list(_numbers(path, rows, len(header[-1])))
+            piece = None
+            for lines, number in _blocks(file, header_rows):
+                values = _parsed(path, lines, number, len(header[-1]))
+                if len(values):
+                    piece = Table(path, header, values)
+                    yield piece
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise RecordingError(f"{path}: cannot be read: {error}") from error
-    if not values:
+    if piece is None:
         raise RecordingError(f"{path}: no data below its header")
-    return Table(path, header, np.array(values, dtype=np.float64))
+
+
+def _blocks(file: TextIO, line: int) -> Iterator[tuple[list[str], int]]:
+    """Lines in blocks, with the number of lines before each."""
+    while lines := list(islice(file, _PIECE_LINES)):
+        yield lines, line
+        line += len(lines)
+
+
+def _parsed(path: Path, lines: list[str], before: int, width: int) -> FloatArray:
+    """The numbers (n, width) of some lines: by numpy where all is plain, else cell by cell to say what is not."""
+    if any(map(str.strip, lines)):
+        with suppress(ValueError):
+            plain: FloatArray = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
+            if plain.shape[1] == width:
+                return plain
+    values = list(_numbers(path, csv.reader(lines), before, width))
+    return np.array(values, dtype=np.float64).reshape(-1, width)
 
 
 def _cells(row: list[str]) -> tuple[str, ...]:
     return tuple(cell.strip() for cell in row)
 
 
-def _numbers(path: Path, rows: Any, width: int) -> Iterator[list[float]]:
+def _numbers(path: Path, rows: Any, before: int, width: int) -> Iterator[list[float]]:
     for row in rows:
         if not row:
             continue
+        line = before + rows.line_num
         if len(row) != width:
-            raise RecordingError(f"{path}: line {rows.line_num} has {len(row)} cells, the header has {width}")
+            raise RecordingError(f"{path}: line {line} has {len(row)} cells, the header has {width}")
         try:
             yield [float(cell) if cell else math.nan for cell in row]
         except ValueError as error:
-            raise RecordingError(f"{path}: line {rows.line_num}: {error}") from None
+            raise RecordingError(f"{path}: line {line}: {error}") from None
 
 
 def matlab_names(path: Path) -> set[str]:

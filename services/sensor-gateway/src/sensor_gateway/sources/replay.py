@@ -1,7 +1,8 @@
 """Replay: a recording's messages published at the pace of the event clock."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -12,9 +13,9 @@ from bootprint.service import EXIT_BAD_INPUT, Context
 from bootprint.topics import Address, Identity
 from sensor_gateway.rates import RateMeter
 from sensor_gateway.recordings.run import Run
+from sensor_gateway.recordings.series import Pieces
 from sensor_gateway.settings import ReplaySource
-from sensor_gateway.sources.run_messages import run_messages
-from sensor_gateway.sources.tlog import TlogRecording
+from sensor_gateway.sources.run_messages import run_messages, sensor_messages
 from sensor_gateway.stamps import due_ns, restamped
 
 __all__ = ["DEFAULT_START_NS", "Recording", "Replay", "open_recording", "run_messages"]
@@ -37,18 +38,20 @@ class Recording(Protocol):
 
 
 class RunRecording:
-    """A run folder or a data set's run."""
+    """A run folder or a data set's run: ``pieces`` gives it from its beginning."""
 
-    def __init__(self, run: Run, settings: ReplaySource, identity: Identity) -> None:
+    def __init__(self, pieces: Callable[[], Pieces], settings: ReplaySource, identity: Identity) -> None:
         self.counts: Counter[str] = Counter()
-        self._run = run
+        self._pieces = pieces
         self._settings = settings
         self._identity = identity
 
     def messages(self, start_ns: int) -> Iterator[Envelope]:
         """The run's messages."""
         settings = self._settings
-        return run_messages(self._run, self._identity, start_ns, settings.batch_size, settings.batch_age_ns)
+        return sensor_messages(
+            self._pieces(), self._identity, start_ns, settings.batch_size, settings.batch_age_ns
+        )
 
 
 def open_recording(path: Path, settings: ReplaySource, identity: Identity) -> Recording:
@@ -56,12 +59,25 @@ def open_recording(path: Path, settings: ReplaySource, identity: Identity) -> Re
     if not path.exists():
         raise RecordingError(f"{path}: no such recording")
     if path.suffix == _TLOG:
+        from sensor_gateway.sources.tlog import TlogRecording  # brings the decoders' libraries
+
         return TlogRecording(path, settings, identity)
     if path.suffix == _MCAP:
         from sensor_gateway.sources.bus_replay import BusRecording  # brings the MCAP library
 
         return BusRecording(path, identity, settings.soldier or identity.soldier)
-    return RunRecording(_choose_run(path, settings.run), settings, identity)
+    return RunRecording(_open_run(path, settings.run), settings, identity)
+
+
+def _open_run(path: Path, name: str | None) -> Callable[[], Pieces]:
+    """A run folder is read while it is played, for it may be long; data sets are read at once."""
+    from sensor_gateway.recordings import run_folder
+
+    if path.is_dir() and name in (None, path.resolve().name) and run_folder.recognises_folder(path):
+        from sensor_gateway.recordings.folder_stream import FolderStream
+
+        return FolderStream(path).pieces
+    return partial(Pieces.of, _choose_run(path, name))
 
 
 def _choose_run(path: Path, name: str | None) -> Run:

@@ -14,7 +14,6 @@ from bootprint.messages import (
     CameraMotion,
     FixKind,
     GnssFix,
-    ImuBatch,
     Int64Array,
     Message,
     Pressure,
@@ -22,22 +21,24 @@ from bootprint.messages import (
     Vector3,
     upper_triangle,
 )
-from bootprint.topics import Identity
-from sensor_gateway.batching import batch_bounds
+from bootprint.topics import Address, Identity
 from sensor_gateway.recordings.run import (
     CameraSeries,
     FloatArray,
     GnssSeries,
-    ImuSeries,
     PressureSeries,
     RangeSeries,
     Run,
 )
+from sensor_gateway.recordings.series import AnySeries, Pieces, usable_rows
+from sensor_gateway.sources.imu_batches import imu_batches, utc_ns
 from sensor_gateway.stamps import due_ns
 
 PRESSURE_SOURCE, GNSS_SOURCE, CAMERA_SOURCE, RANGE_SOURCE = "body", "gnss", "camera", "uwb"
 BATCH_AGE_NS = 60_000_000
 AnyMessage = TypeVar("AnyMessage", bound=Message)
+_Rows = tuple[Int64Array, Callable[[int, int, int], AnyMessage]]
+"""Which rows, and the message of a row, its time UTC ns and its sequence."""
 _log = structlog.get_logger()
 
 
@@ -49,83 +50,57 @@ def run_messages(
     A batch is known with its last sample (`due_ns`); messages due at the same time come by subject and source.
     Samples that are not finite or do not advance in time are left out.
     """
-    streams = [
-        _sent(identity, "imu", place, _imu(imu, start_ns, batch, max_age_ns)) for place, imu in _imus(run)
+    return sensor_messages(Pieces.of(run), identity, start_ns, batch, max_age_ns)
+
+
+def sensor_messages(
+    pieces: Pieces, identity: Identity, start_ns: int, batch: int = 10, max_age_ns: int = BATCH_AGE_NS
+) -> Iterator[Envelope]:
+    """The same of a run that comes in pieces; how it is cut makes no difference."""
+    streams: list[tuple[str, str, Iterator[Message]]] = [
+        ("imu", place, imu_batches(imu, start_ns, batch, max_age_ns))
+        for place, imu in sorted(pieces.imus.items())
     ]
-    if run.pressure is not None:
-        streams.append(_sent(identity, "pressure", PRESSURE_SOURCE, _pressure(run.pressure, start_ns)))
-    if run.gnss is not None:
-        streams.append(_sent(identity, "gnss", GNSS_SOURCE, _gnss(run.gnss, start_ns)))
-    if run.camera is not None:
-        streams.append(_sent(identity, "camera_motion", CAMERA_SOURCE, _camera(run.camera, start_ns)))
-    if run.ranges is not None:
-        streams.append(_sent(identity, "range", RANGE_SOURCE, _ranges(run.ranges, start_ns)))
-    return heapq.merge(*streams, key=lambda envelope: (due_ns(envelope.message), envelope.address))
+    streams += [
+        ("pressure", PRESSURE_SOURCE, _by_row(pieces.pressure, _pressure, start_ns)),
+        ("gnss", GNSS_SOURCE, _by_row(pieces.gnss, _gnss, start_ns)),
+        ("camera_motion", CAMERA_SOURCE, _by_row(pieces.camera, partial(_camera, start_ns), start_ns)),
+        ("range", RANGE_SOURCE, _by_row(pieces.ranges, _ranges, start_ns)),
+    ]
+    sent = [_sent(identity.address(subject, source), messages) for subject, source, messages in streams]
+    return heapq.merge(*sent, key=lambda envelope: (due_ns(envelope.message), envelope.address))
 
 
-def _imus(run: Run) -> list[tuple[str, ImuSeries]]:
-    return sorted(run.imus.items())
-
-
-def _sent(identity: Identity, subject: str, source: str, messages: Iterator[Message]) -> Iterator[Envelope]:
-    address = identity.address(subject, source)
+def _sent(address: Address, messages: Iterator[Message]) -> Iterator[Envelope]:
     return (Envelope(address, message) for message in messages)
 
 
-def _utc_ns(time_s: FloatArray, start_ns: int) -> Int64Array:
-    """Times from the run's zero as UTC ns, (n,)."""
-    return np.asarray(start_ns + np.round(time_s * 1e9).astype(np.int64), dtype=np.int64)
+def _by_row(
+    pieces: Iterator[AnySeries], chosen: Callable[[AnySeries, float], _Rows[AnyMessage]], start_ns: int
+) -> Iterator[AnyMessage]:
+    """A message a row (chosen of a piece, given the newest time before); one out of range is told and left out."""
+    sequence, before, newest_s = 0, 0, -math.inf
+    for series in pieces:
+        rows, make = chosen(series, newest_s)
+        for row, time_ns in zip(rows, utc_ns(series.time_s[rows], start_ns), strict=True):
+            try:
+                yield make(int(row), int(time_ns), sequence)
+            except ValueError as error:
+                _log.warning("recording.row_left_out", row=before + int(row), error=str(error))
+            sequence += 1
+        newest_s = float(series.time_s[rows[-1]]) if len(rows) else newest_s
+        before += len(series.time_s)
 
 
-def _usable(time_s: FloatArray, *columns: FloatArray) -> Int64Array:
-    """The indices of the samples that are finite in every column and later than all before them."""
-    finite = np.isfinite(time_s)
-    for column in columns:
-        finite &= np.isfinite(column.reshape(len(time_s), -1)).all(axis=1)
-    candidates = np.flatnonzero(finite)
-    times = time_s[candidates]
-    before = np.concatenate([[-np.inf], np.maximum.accumulate(times)[:-1]]) if len(times) else times
-    return np.asarray(candidates[times > before], dtype=np.int64)
-
-
-def _chosen(values: FloatArray, rows: Int64Array) -> FloatArray:
-    """These rows; no copy of a long recording if it is all of them, as it nearly always is."""
-    return values if len(rows) == len(values) else values[rows]
-
-
-def _imu(imu: ImuSeries, start_ns: int, size: int, max_age_ns: int) -> Iterator[ImuBatch]:
-    rows = _usable(imu.time_s, imu.accel_m_s2, imu.gyro_rad_s)
-    times = _utc_ns(imu.time_s[rows], start_ns)
-    accel, gyro = _chosen(imu.accel_m_s2, rows), _chosen(imu.gyro_rad_s, rows)
-    mag = None if imu.mag_ut is None else _chosen(imu.mag_ut, rows)
-    for sequence, (first, end) in enumerate(batch_bounds(times, size, max_age_ns)):
-        field = None if mag is None or not np.isfinite(mag[first:end]).all() else mag[first:end]
-        yield ImuBatch.from_arrays(sequence, times[first:end], accel[first:end], gyro[first:end], field)
-
-
-def _pressure(series: PressureSeries, start_ns: int) -> Iterator[Pressure]:
-    rows = _usable(series.time_s, series.pressure_pa)
-
+def _pressure(series: PressureSeries, after_s: float) -> _Rows[Pressure]:
     def message(row: int, time_ns: int, sequence: int) -> Pressure:
         return Pressure(time_ns=time_ns, sequence=sequence, pressure_pa=float(series.pressure_pa[row]))
 
-    return _rows(message, rows, _utc_ns(series.time_s[rows], start_ns))
+    return usable_rows(series.time_s, series.pressure_pa, after_s=after_s), message
 
 
-def _gnss(series: GnssSeries, start_ns: int) -> Iterator[GnssFix]:
-    rows = _usable(series.time_s)
-    return _rows(partial(_fix, series), rows, _utc_ns(series.time_s[rows], start_ns))
-
-
-def _rows(
-    make: Callable[[int, int, int], AnyMessage], rows: Int64Array, times_ns: Int64Array
-) -> Iterator[AnyMessage]:
-    """A message a row; a row whose values are out of range is told and left out."""
-    for sequence, (row, time_ns) in enumerate(zip(rows, times_ns, strict=True)):
-        try:
-            yield make(int(row), int(time_ns), sequence)
-        except ValueError as error:
-            _log.warning("recording.row_left_out", row=int(row), error=str(error))
+def _gnss(series: GnssSeries, after_s: float) -> _Rows[GnssFix]:
+    return usable_rows(series.time_s, after_s=after_s), partial(_fix, series)
 
 
 def _fix(series: GnssSeries, row: int, time_ns: int, sequence: int) -> GnssFix:
@@ -152,9 +127,9 @@ def _known(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _camera(series: CameraSeries, start_ns: int) -> Iterator[CameraMotion]:
-    rows = _usable(series.time_s, series.start_time_s, series.translation_m, series.rotation_rad)
-    starts_ns = _utc_ns(np.nan_to_num(series.start_time_s), start_ns)
+def _camera(start_ns: int, series: CameraSeries, after_s: float) -> _Rows[CameraMotion]:
+    motion = series.start_time_s, series.translation_m, series.rotation_rad
+    starts_ns = utc_ns(np.nan_to_num(series.start_time_s), start_ns)
 
     def message(row: int, time_ns: int, sequence: int) -> CameraMotion:
         return CameraMotion(
@@ -167,7 +142,7 @@ def _camera(series: CameraSeries, start_ns: int) -> Iterator[CameraMotion]:
             confidence_pct=None if series.confidence_pct is None else _known(series.confidence_pct[row]),
         )
 
-    return _rows(message, rows, _utc_ns(series.time_s[rows], start_ns))
+    return usable_rows(series.time_s, *motion, after_s=after_s), message
 
 
 def _camera_covariance(series: CameraSeries, row: int) -> tuple[float, ...] | None:
@@ -178,7 +153,7 @@ def _camera_covariance(series: CameraSeries, row: int) -> tuple[float, ...] | No
     return upper_triangle(np.diag(sigmas**2)) if np.isfinite(sigmas).all() else None
 
 
-def _ranges(series: RangeSeries, start_ns: int) -> Iterator[Range]:
+def _ranges(series: RangeSeries, _after_s: float) -> _Rows[Range]:
     """Every range of every peer: two peers may answer at the same time, so stamps need not rise."""
     rows = np.flatnonzero(np.isfinite(series.time_s) & np.isfinite(series.distance_m))
     rows = rows[np.argsort(series.time_s[rows], kind="stable")]
@@ -192,7 +167,7 @@ def _ranges(series: RangeSeries, start_ns: int) -> Iterator[Range]:
             sigma_m=_known(series.sigma_m[row]),
         )
 
-    return _rows(message, np.asarray(rows, dtype=np.int64), _utc_ns(series.time_s[rows], start_ns))
+    return np.asarray(rows, dtype=np.int64), message
 
 
 def _vector(values: FloatArray) -> Vector3:
