@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 ROOMS := shared services/sensor-gateway services/pdr-engine services/fusion services/sa-hub proving-ground
 READY := $(VENV)/.ready
 
-.PHONY: help setup demo test check format golden figures compose-test constraints clean
+.PHONY: help setup demo test check format golden figures vectors fuzz compose-test constraints clean
 
 help: ## show what there is to make
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -46,7 +46,15 @@ figures: $(READY) ## make anew the figures and generated pages of the documents
 	$(BIN)/bootprint topics > docs/topics.md
 	$(BIN)/python -m proving_ground.scenario.keys_page docs/scenarios.md
 	$(BIN)/python -m proving_ground.evaluation.figures $(or $(BOOTPRINT_DATA),../shared/data) docs
+	$(BIN)/python -m proving_ground.evaluation.body_page $(or $(BOOTPRINT_DATA),../shared/data) docs
 	$(BIN)/python -m proving_ground.agreement.report $(or $(BOOTPRINT_DATA),../shared/data) docs
+	$(BIN)/python -m proving_ground.radio_load.figures $(or $(BOOTPRINT_DATA),../shared/data) docs
+
+vectors: $(READY) ## write the radio's test vectors anew; review the difference
+	PYTHONPATH=tests $(BIN)/python -m support.radio_vectors
+
+fuzz: $(READY) ## ten million mutated and random radio frames (ARGS='--frames 100000' for fewer)
+	PYTHONPATH=tests $(BIN)/python -m support.radio_fuzz $(ARGS)
 
 compose-test: ## build the image, run docker-compose.yml for real (needs a Docker engine)
 	deploy/compose-test

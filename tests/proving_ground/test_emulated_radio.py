@@ -5,7 +5,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from proving_ground.exercises.emulated_radio import EmulatedNet, NetProfile
+import pytest
+
+from proving_ground.exercises.emulated_radio import Air, EmulatedNet, NetProfile
 from support.waiting import wait_until
 
 FAST = NetProfile("test", rate_bits_per_s=1e6, latency_s=0.0)
@@ -73,3 +75,21 @@ def test_a_member_that_left_does_not_disturb_the_others() -> None:
         for n in range(20):
             members[0].sendto(b"%d" % n, ("127.0.0.1", net.port))
         assert [members[1].recv(10) for _ in range(20)] == [b"%d" % n for n in range(20)]
+
+
+def test_a_named_radios_key_up_takes_its_time_on_the_air() -> None:
+    """VHF at 1.2 kbit/s: 0.3 s of key-up, then 8 + 22 bytes take 0.2 s; after 0.2 s more everyone has heard."""
+    air = Air(NetProfile.of_radio("vhf", "vhf-1200"), ["a", "b"], zero_s=0.0)
+    air.transmit("a", bytes(22), 1.0)
+    air.transmit("b", bytes(22), 1.0)
+    assert [delivery.due_s for delivery in air.arrived(10.0)] == pytest.approx([1.7, 2.2])
+    assert air.counts.bytes == 2 * (45 + 30)
+
+
+def test_a_nets_own_figures_go_before_the_radios() -> None:
+    own = NetProfile.of_radio(
+        "net", "vhf-2400", rate_bits_per_s=1200.0, header_bytes=0, latency_s=None, loss=0.1
+    )
+    assert (own.rate_bits_per_s, own.header_bytes, own.latency_s, own.loss) == (1200.0, 0, 0.2, 0.1)
+    assert own.medium.air_bytes(20) == 45 + 20
+    assert NetProfile.of_radio("net", None) == NetProfile("net", 9600.0, latency_s=0.05, header_bytes=28)

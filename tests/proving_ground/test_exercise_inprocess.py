@@ -13,7 +13,7 @@ from bootprint.messages import Position
 from bootprint.recording import Recording
 from proving_ground.exercises.emulated_radio import Air, NetProfile
 from proving_ground.exercises.exercise import Exercise, Fault, Net
-from proving_ground.exercises.exercise_files import soldier_settings
+from proving_ground.exercises.exercise_files import hub_settings, soldier_settings
 from proving_ground.exercises.inprocess_play import line_job, play_in_process
 from proving_ground.exercises.line import play_line
 from proving_ground.exercises.report import write_report
@@ -209,12 +209,23 @@ def test_wrong_parameters_are_named(squad: Exercise) -> None:
     for settings, expected in (
         ({"net.los": 0.1}, "net.los: unknown; known: rate_bits_per_s"),
         ({"net.loss": 2}, "want a number from 0 to 0.9"),
+        ({"net.profile": "vhf-12000"}, "no radio profile 'vhf-12000'; did you mean 'vhf-1200'"),
         ({"hub.treshold_m": 3}, "treshold_m"),
         ({"fusion.rate_hz": 0.1}, "rate_hz"),
         ({"loss": 0.1}, "want one of net"),
     ):
         with pytest.raises(ConfigError, match=expected):
             with_settings(squad, settings)
+
+
+def test_every_net_can_be_made_one_of_a_named_radio(squad: Exercise) -> None:
+    changed = with_settings(squad, {"net.loss": 0.2, "net.profile": "lora-short-fast"})
+    for net in changed.nets:
+        assert (net.profile.rate_bits_per_s, net.profile.latency_s, net.profile.loss) == (10_937.0, 0.05, 0.2)
+        for member in net.members:
+            link = next(link for link in hub_settings(changed, member).links if link.name == net.profile.name)
+            assert (link.profile, link.channel_bits_per_s) == ("lora-short-fast", 10_937)
+            assert link.rate_bits_per_s <= 1092  # the duty cycle's, whatever the share of the net
 
 
 # -- the air itself, by hand --------------------------------------------------------------------------------------

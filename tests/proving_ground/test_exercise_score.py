@@ -126,12 +126,14 @@ def test_a_picture_is_what_the_receiver_predicts() -> None:
     one = soldier(True, WALK)
     compared = compare(one, [position(t, float(t), 0.0) for t in range(11)], START_NS)
     assert compared is not None
-    # One report of t = 1, heard at t = 2, that claims 0.5 m/s: at t the receiver believes 1 + 0.5 (t - 1).
+    # One report of t = 1, heard at t = 2, that claims 0.5 m/s: at t the receiver believes that this went on for
+    # τ (1 − e^(−(t − 1)/τ)), with τ of a minute.
     heard = log_of((2.0, track(1.0, 1.0, 0.0, (0.5, 0.0))))
     picture = sample_picture(heard, [compared], START_NS, exercise(one))
     seconds = np.arange(2.0, 10.0)
     np.testing.assert_allclose(picture.age_s, seconds - 1.0)
-    np.testing.assert_allclose(picture.added_m, 0.5 * (seconds - 1.0), atol=1e-6)
+    gone_s = 60.0 * (1.0 - np.exp(-(seconds - 1.0) / 60.0))
+    np.testing.assert_allclose(picture.added_m, seconds - 1.0 - 0.5 * gone_s, atol=1e-6)
     np.testing.assert_allclose(picture.against_truth_m, picture.added_m, atol=1e-6)
     row = picture_row("cp", picture, AGES)
     assert row["age_p95_s"] == pytest.approx(np.percentile(seconds - 1.0, 95))
@@ -160,6 +162,18 @@ def test_what_is_shown_as_fresh_ten_metres_off_is_false_and_what_is_lost_is_miss
     row = picture_row("cp", picture, Ages(stale_s=5.0, lost_s=8.0))
     assert row["false_pct"] == pytest.approx(100.0 * 2 / 5)
     assert row["missing_pct"] == pytest.approx(100.0 * 2 / 10)
+
+
+@pytest.mark.parametrize(("held", "inside"), [({}, 10), ({"held_m": 0.5, "held_s": 60.0}, 3)])
+def test_a_picture_is_as_doubtful_as_a_display_shows_it(held: dict[str, float], inside: int) -> None:
+    one = soldier(True, WALK)
+    compared = compare(one, [position(t, float(t), 0.0) for t in range(11)], START_NS)
+    assert compared is not None
+    # Reported still at t = 0: wrong by t metres. Free, doubt grows by 0.6 m/s, 95 % by 1.5; held at 0.5 m beside
+    # the sender's 1 m the circle stays at 2.74 m, which holds seconds 0 to 2.
+    report = msgspec.structs.replace(track(0.0, 0.0, 0.0, (0.0, 0.0)), **held)
+    picture = sample_picture(log_of((0.0, report)), [compared], START_NS, exercise(one))
+    assert picture_row("cp", picture, AGES)["inside_95_pct"] == pytest.approx(100.0 * inside / 10)
 
 
 def test_a_picture_counts_floors_where_there_are_floors() -> None:

@@ -37,7 +37,8 @@ barometer = "none"
 MORE = """
 [[nets]]
 each = "platoon"
-rate_bits_per_s = 1200
+profile = "vhf-1200"
+latency_s = 0.4
 outages = [{ from_s = 5, until_s = 7 }, { from_s = 9 }]
 [[nets]]
 each = "squad"
@@ -163,6 +164,10 @@ def test_posts_nets_and_faults_are_handed_over(scenario: Scenario, exercise: Exe
     assert nets["hq"].outages_s == ((5.0, 7.0), (9.0, scenario.play(3).duration_s))
     assert nets["alpha"].members == ("a1", "a2", "a3")
     assert nets["alpha"].profile.loss == 0.2
+    radios = {name: (net.profile.profile, net.profile.rate_bits_per_s) for name, net in nets.items()}
+    assert set(radios.values()) == {("vhf-1200", 1200.0), (None, 9600.0)}
+    slow = next(net.profile for net in exercise.nets if net.profile.profile)
+    assert (slow.latency_s, slow.header_bytes) == (0.4, 8)
     assert exercise.faults == (
         Fault(6.0, "sensor_frozen", "a1", {"sensor": "left_foot", "for_s": 2.0}),
         Fault(12.0, "clock_jump", "cp", {"jump_s": -3600.0}),

@@ -117,6 +117,7 @@ MORE = [
     ('\n[[nets]]\nname = "x"\nmembers = ["a1"]\n', "[[nets]]", "it needs two"),
     ('\n[[nets]]\nname = "x"\nmembers = ["a1", "zz"]\n', "members", "no unit, soldier or post 'zz'"),
     (NET + NET, "[[nets]]", "two nets 'alpha'"),
+    (NET + 'profile = "vhf-120"\n', "[[nets]]", "no radio profile 'vhf-120'; did you mean 'vhf-1200'"),
     ('\n[[posts]]\nid = "a1"\nunit = "alpha"\n', 'id = "a1"', "is taken"),
 ]
 

@@ -20,7 +20,7 @@ from bootprint.messages import (
 from bootprint.topics import Address
 from sa_hub.assembly import build_hub
 from sa_hub.hub import HubCore
-from sa_hub.radio.content import Report, Reports
+from sa_hub.radio.content import Report, Reports, Update
 from sa_hub.radio.counters import Block
 from sa_hub.radio.frame import Codec
 from sa_hub.radio.seal import NetKeys, Opener
@@ -63,7 +63,7 @@ def opened(air: Air, sender: str, net: str) -> list[tuple[int, tuple[Report, ...
     for time_ns, name, link_name, data in air.log:
         if (name, link_name) == (sender, net):
             frame = opener.open(data)
-            content = codec.decode(frame.kind, frame.sender, frame.payload, time_ns).content
+            content = codec.decode(frame.sender, frame.payload, time_ns).content
             if isinstance(content, Reports):
                 found.append((time_ns, content.reports))
     return found
@@ -107,11 +107,20 @@ def test_a_relay_never_echoes_a_net_its_own_news() -> None:
 
 
 def test_a_relay_gathers_several_soldiers_in_one_frame() -> None:
-    air = Air(a_squad())
+    """On a narrow link; where bits are plenty nobody has to wait."""
+    narrow = link("company", 60, header_bytes=0)
+    soldiers = {name: hub(name, SQUAD) for name in WALKS}
+    air = Air({**soldiers, "lead": hub("lead", SQUAD, narrow, role="squad_leader")})
     air.run(180.0, {name: Walk(15.0 * n, turn_deg=50.0) for n, name in enumerate(WALKS)})
-    frames = opened(air, "lead", "company")
-    reports = sum(len(reports) for _, reports in frames)
-    assert reports / len(frames) > 2.0
+    codec, opener = Codec(ORIGIN), Opener(NetKeys(GROUP_KEY, "company", 8))
+    contents = [
+        codec.decode(10, opener.open(data).payload, time_ns).content
+        for time_ns, name, net, data in air.log
+        if (name, net) == ("lead", "company")
+    ]
+    updates = [len(content.entries) for content in contents if isinstance(content, Update)]
+    assert len(updates) > 5
+    assert sum(updates) / len(updates) > 2.0
 
 
 def test_other_squads_and_the_command_post_come_back_to_the_soldiers() -> None:
@@ -177,15 +186,17 @@ def test_tracks_go_stale_and_lost_and_come_back() -> None:
     air = Air(a_squad())
     air.run(20.0, WALKS)
     quiet = {name: walk for name, walk in WALKS.items() if name != "a2"}
-    last_ns = air.tracks["lead", "a2"].time_ns
+    last_ns = air.now_ns
     states: dict[str, int] = {}
 
     def watch(now_ns: int) -> None:
         states.setdefault(air.tracks["lead", "a2"].state, now_ns)
 
     air.run(200.0, quiet, watch)
-    assert states["stale"] - last_ns == pytest.approx(75 * S, abs=0.11 * S)
-    assert states["lost"] - last_ns == pytest.approx(180 * S, abs=0.11 * S)
+    newest_ns = air.tracks["lead", "a2"].time_ns
+    assert last_ns - 15 * S <= newest_ns <= last_ns + 2 * S  # a fresh report is told as of its frame's time
+    assert states["stale"] - newest_ns == pytest.approx(75 * S, abs=0.11 * S)
+    assert states["lost"] - newest_ns == pytest.approx(180 * S, abs=0.11 * S)
     assert air.tracks["a2", "a2"].state == "lost"
     assert air.hubs["lead"].figures().gauges == {
         "tracks_fresh": 3.0,
@@ -206,7 +217,10 @@ def test_a_lost_track_is_not_relayed() -> None:
     for seconds in (300, 310, 600, 610):
         leader.tick(START_NS + seconds * S)
     assert leader.figures().gauges["tracks_lost"] == 1.0
-    assert leader.take_frames() == []
+    opener, codec = Opener(NetKeys(GROUP_KEY, "company", 8)), Codec(ORIGIN)
+    opened_frames = [opener.open(frame.data) for frame in leader.take_frames() if frame.link == "company"]
+    said_there = [codec.decode(each.sender, each.payload, START_NS).content for each in opened_frames]
+    assert not any(isinstance(content, Reports) for content in said_there)
 
 
 def test_our_own_track_goes_stale_within_seconds() -> None:
@@ -224,7 +238,8 @@ def test_a_soldier_who_stands_still_is_told_from_one_who_is_lost() -> None:
     assert air.tracks["cp", "a1"].state == "fresh"
     times_s = [(time_ns - START_NS) / S for time_ns, _ in opened(air, "a1", "squad")]
     pauses_s = [late - early for early, late in pairwise(times_s)]
-    assert pauses_s == pytest.approx([3.0, 6.0, 12.0, 24.0] + [30.0] * 8, abs=0.2)
+    assert max(pauses_s) <= 30.2  # the heartbeat, sooner where bits are cheap
+    assert min(pauses_s[3:]) >= 5.0  # the first are repeated sooner
 
 
 def test_tracks_are_published_under_the_hubs_own_subtree() -> None:
@@ -427,7 +442,7 @@ def test_a_hub_with_no_counters_left_is_silent_and_says_so() -> None:
 
 def test_garbage_from_the_air_is_counted() -> None:
     core = hub("a1", SQUAD)
-    for data in (b"", b"\x00", b"\x40" + bytes(30), bytes(range(256))):
+    for data in (b"", b"\x00", b"\x80" + bytes(30), bytes(range(256))):
         assert core.receive("squad", data, START_NS) == []
     assert sum(core.figures().counters.values()) == 4
 

@@ -11,7 +11,8 @@ from bootprint.config import convert
 from bootprint.errors import ConfigError
 from sa_hub.commands import register
 from sa_hub.keys import create_group_key, load_group_key
-from sa_hub.settings import HubSettings, check_settings
+from sa_hub.radio.profiles import named
+from sa_hub.settings import HubSettings, LinkProfile, check_settings
 
 LINK = {"name": "squad", "rate_bits_per_s": 1200}
 
@@ -111,3 +112,84 @@ def test_the_command_makes_a_key_and_does_not_print_it(tmp_path: Path) -> None:
     assert result.exit_code == 0
     assert load_group_key(path).hex() not in result.output
     assert isinstance(CliRunner().invoke(app, ["keys", "new", str(path)]).exception, ConfigError)
+
+
+def link(**values: object) -> LinkProfile:
+    return settings(links=[{"name": "squad", **values}]).links[0]
+
+
+def test_a_named_radio_gives_what_the_link_does_not() -> None:
+    vhf = link(profile="vhf-1200")
+    assert (vhf.rate_bits_per_s, vhf.channel_bits_per_s, vhf.header_bytes, vhf.key_up_s) == (
+        1200,
+        1200,
+        8,
+        0.3,
+    )
+    assert vhf.air_bytes(20) == named("vhf-1200").air_bytes(20)
+    own = link(profile="vhf-1200", rate_bits_per_s=300, header_bytes=0, peers=["h:1", "h:2"], depth_bits=1500)
+    assert (own.rate_bits_per_s, own.channel_bits_per_s, own.depth_bits) == (300, 1200, 1500)
+    assert own.air_bytes(20) == 2 * (20 + 45)
+    lora = link(profile="lora-long-fast")
+    assert lora.rate_bits_per_s == 106
+    assert lora.air_bytes(20) == named("lora-long-fast").air_bytes(20)
+    assert link(profile="lora-short-fast", duty_cycle=0.01).rate_bits_per_s == 108
+
+
+def test_a_plain_link_paces_nothing_and_a_radio_sends_one_frame_after_the_other() -> None:
+    assert link(rate_bits_per_s=1200).pace_bits_per_s is None
+    assert link(profile="vhf-2400", rate_bits_per_s=100).pace_bits_per_s == 2400
+    assert link(kind="serial", port="/dev/ttyS0", baud=1200, rate_bits_per_s=100).pace_bits_per_s == 960
+    assert link(profile="raw", rate_bits_per_s=1_000_000).pace_bits_per_s == 1_000_000
+
+
+def test_a_serial_frame_costs_its_framing_too() -> None:
+    line = link(kind="serial", port="/dev/ttyS0", rate_bits_per_s=1200)
+    assert line.air_bytes(20) == 25
+    assert link(kind="zenoh", router="tcp/h:7447", rate_bits_per_s=9600).air_bytes(20) == 104
+
+
+def test_the_longest_frame_fits_mtu_and_bits() -> None:
+    assert link(rate_bits_per_s=1200).longest_frame(4000) == 250
+    assert link(rate_bits_per_s=1200, peers=["h:1"] * 4).longest_frame(4000) == 4000 // 32 - 28
+    assert link(rate_bits_per_s=1200).longest_frame(8 * 28 - 1) == 0
+    slow = link(profile="lora-long-slow")
+    longest = slow.longest_frame(slow.depth_bits)
+    assert 8 * slow.air_bytes(longest) <= slow.depth_bits < 8 * slow.air_bytes(longest + 1)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"profile": "vhf1200"}, "did you mean 'vhf-1200'"),
+        ({"kind": "carrier pigeon"}, "kind is 'carrier pigeon': expected one of"),
+        ({"kind": "serial", "rate_bits_per_s": 1200}, "lacks the key 'port'"),
+        ({"kind": "file", "profile": "raw"}, "lacks the key 'path'"),
+        (
+            {"profile": "raw", "baud": 9600},
+            'baud belongs to kind = "serial"; this link is kind = "udp", which has bind, peers, interface',
+        ),
+        (
+            {"kind": "serial", "port": "/dev/ttyS0", "profile": "raw", "peers": ["h:1"]},
+            'peers belongs to kind = "udp"',
+        ),
+        (
+            {"profile": "lora-long-fast", "rate_bits_per_s": 500},
+            "a duty cycle of 10 % of 1074 bit/s leaves 106",
+        ),
+        ({"profile": "vhf-1200", "rate_bits_per_s": 2400}, "the radio sends at 1200"),
+        ({"rate_bits_per_s": 1200, "depth_bits": 5000}, "want at most 4000"),
+        (
+            {"kind": "serial", "port": "p", "profile": "raw", "mtu_bytes": 1000},
+            "at most 252 on a serial link",
+        ),
+        ({"profile": "lora-long-slow", "duty_cycle": 0.01}, "no more than 40 bits go in one burst"),
+    ],
+)
+def test_keys_that_do_not_fit_the_kind_or_the_radio_are_refused(
+    values: dict[str, object], message: str
+) -> None:
+    with pytest.raises(ConfigError) as caught:
+        link(**values)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -7,14 +7,17 @@ from pathlib import Path
 import pytest
 
 from bootprint.config import convert
-from sa_hub.radio.content import Report, Reports
+from sa_hub.radio.content import Entry, Report, Reports, Update
 from sa_hub.radio.frame import Codec
 from sa_hub.radio.layout import layout_markdown
+from sa_hub.radio.link_profile import DEFAULT_BAUD
+from sa_hub.radio.links.serial_line import DEFAULT_GUARD_S
+from sa_hub.radio.profiles.table import profiles_markdown
 from sa_hub.settings import HubSettings, LinkProfile
 from support.hub_squad import ORIGIN, START_NS
 
 MANUAL = (Path(__file__).parents[2] / "docs" / "radio.md").read_text(encoding="utf-8")
-HEADER_AND_TAG = 3 + 8
+HEADER_AND_TAG = 2 + 8
 RESOLUTION = 3
 
 
@@ -22,6 +25,20 @@ def test_the_tables_are_the_codes_own() -> None:
     between = re.search(r"<!-- layout -->\n\n(.*)\n\n<!-- end of layout -->", MANUAL, re.DOTALL)
     assert between is not None
     assert between[1] == layout_markdown()
+
+
+def test_the_table_of_radios_is_made_from_their_files() -> None:
+    between = re.search(r"<!-- profiles -->\n\n(.*)\n\n<!-- end of profiles -->", MANUAL, re.DOTALL)
+    assert between is not None
+    assert between[1] == profiles_markdown()
+
+
+def test_the_examples_of_other_kinds_of_links_are_right() -> None:
+    toml = MANUAL.split("```toml\n")[2].split("```")[0]
+    section = tomllib.loads(toml)["hub"]
+    links = convert(section, HubSettings, where="docs/radio.md").links
+    assert [link.kind for link in links] == ["serial", "zenoh", "file"]
+    assert (links[0].baud, links[0].guard_s) == (DEFAULT_BAUD, DEFAULT_GUARD_S)
 
 
 def walker(number: int, metres: float, height_m: float | None, speed_m_s: float, hops: int) -> Report:
@@ -39,21 +56,21 @@ def walker(number: int, metres: float, height_m: float | None, speed_m_s: float,
 
 def size(reports: list[Report]) -> int:
     """Bytes of a frame with a short header and the 8-byte tag, sent by number 1."""
-    return HEADER_AND_TAG + len(Codec(ORIGIN).encode(1, Reports(tuple(reports)), RESOLUTION, 9999)[1])
+    return HEADER_AND_TAG + len(Codec(ORIGIN).encode(1, Reports(tuple(reports)), RESOLUTION, 9999))
 
 
 @pytest.mark.parametrize(
     ("line", "reports"),
     [
-        ("one soldier, walking, height known", [walker(1, 9.0, 60.0, 1.3, 0)]),
-        ("one soldier, standing, or height unknown", [walker(1, 9.0, 60.0, 0.0, 0)]),
-        ("one soldier, standing, or height unknown", [walker(1, 9.0, None, 1.3, 0)]),
+        ("one soldier in full, walking, height known", [walker(1, 9.0, 60.0, 1.3, 0)]),
+        ("one soldier in full, standing, or height unknown", [walker(1, 9.0, 60.0, 0.0, 0)]),
+        ("one soldier in full, standing, or height unknown", [walker(1, 9.0, None, 1.3, 0)]),
         (
-            "8 soldiers within 120 m, one instant, numbers in a row",
+            "8 soldiers in full within 120 m, one instant, numbers in a row",
             [walker(number, 120.0, 60.0 + number % 3 * 3, 1.3, 1) for number in range(2, 10)],
         ),
         (
-            "40 soldiers within 300 m, one instant, numbers in a row",
+            "40 soldiers in full within 300 m, one instant, numbers in a row",
             [walker(number, 300.0, 60.0 + number % 3 * 3, 1.3, 1) for number in range(2, 42)],
         ),
     ],
@@ -62,6 +79,24 @@ def test_the_sizes_are_as_told(line: str, reports: list[Report]) -> None:
     told = re.search(rf"\| {re.escape(line)} \| (\d+) \|", MANUAL)
     assert told is not None
     assert size(reports) == int(told[1])
+
+
+@pytest.mark.parametrize(
+    ("line", "count", "bound"),
+    [
+        ("one soldier of its own, walking, as an update", 1, 20),
+        ("8 soldiers walking, numbers in a row, as an update", 8, 58),
+        ("40 soldiers walking, numbers in a row, as an update", 40, 250),
+    ],
+)
+def test_the_sizes_of_updates_are_as_told(line: str, count: int, bound: int) -> None:
+    told = re.search(rf"\| {re.escape(line)} \| (\d+) \|", MANUAL)
+    entries = tuple(Entry(number, 7 * number, 5 * number, (3, 6)) for number in range(1, count + 1))
+    update = Update(START_NS // 100_000_000, 3, 4, 0, entries)
+    assert told is not None
+    size = HEADER_AND_TAG + len(Codec(ORIGIN).encode(1, update, RESOLUTION, 9999))
+    assert size == int(told[1])
+    assert size <= bound
 
 
 def test_the_example_configuration_shows_the_defaults() -> None:

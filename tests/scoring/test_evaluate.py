@@ -134,15 +134,16 @@ def test_a_narrow_terminal_gets_the_most_telling_columns_whole() -> None:
 def test_runs_without_an_estimator_are_told(
     walk_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    body = tmp_path / "chest"
-    body.mkdir()
-    (body / "body.csv").write_bytes((walk_folder / "right_foot.csv").read_bytes())
-    assert bootprint(monkeypatch, walk_folder, body, "--json", "-") == 0
+    camera = tmp_path / "camera"
+    camera.mkdir()
+    motion = "start_time_s,time_s,tx_m,ty_m,tz_m,rx_rad,ry_rad,rz_rad\n0,0.1,0.1,0,0,0,0,0\n"
+    (camera / "camera_motion.csv").write_text(motion)
+    assert bootprint(monkeypatch, walk_folder, camera, "--json", "-") == 0
     captured = capsys.readouterr()
     assert [row["run"] for row in json.loads(captured.out)] == ["square"]
-    assert "run=chest kind=body" in captured.err
-    assert bootprint(monkeypatch, body) == 2
-    assert "no estimator for kind body yet" in capsys.readouterr().err
+    assert "run=camera kind=camera" in captured.err
+    assert bootprint(monkeypatch, camera) == 2
+    assert "no estimator for kind camera" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bootprint.config import Origin
-from bootprint.geodesy import LocalFrame, azimuth_of, major_axis_sigma_m, wrap_angle, yaw_of_azimuth
+from bootprint.geodesy import (
+    LocalFrame,
+    azimuth_of,
+    ground_offset,
+    major_axis_sigma_m,
+    moved_place,
+    wrap_angle,
+    yaw_of_azimuth,
+)
 
 A_M = 6_378_137.0
 F = 1 / 298.257223563
@@ -170,3 +178,20 @@ def test_a_hundred_metres_above_the_poles(latitude_deg: float, z_m: float) -> No
     found = frame(latitude_deg, 0.0).to_geodetic(0.0, 0.0, 100.0)
     assert found[0] == pytest.approx(latitude_deg)
     assert found[2] == pytest.approx(abs(z_m) - B_M, abs=1e-6)
+
+
+@given(
+    st.floats(-89.0, 89.0), st.floats(-180.0, 180.0), st.floats(-3000.0, 3000.0), st.floats(-3000.0, 3000.0)
+)
+def test_a_place_moved_is_as_far_off_as_it_was_moved(
+    latitude: float, longitude: float, east: float, north: float
+) -> None:
+    moved = moved_place((latitude, longitude), east, north)
+    assert ground_offset((latitude, longitude), moved) == pytest.approx((east, north), abs=2e-3)
+
+
+def test_no_move_leaves_the_poles_or_the_map() -> None:
+    for pole in (90.0, -90.0):
+        latitude, longitude = moved_place((pole, 10.0), 1000.0, 1000.0)
+        assert abs(latitude) <= 90.0
+        assert abs(longitude) <= 180.0

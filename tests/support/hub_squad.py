@@ -10,6 +10,7 @@ from bootprint import wire
 from bootprint.bus import Envelope
 from bootprint.config import Member, Origin, Realm
 from bootprint.messages import Position, Track
+from bootprint.prediction import moved_m
 from bootprint.topics import Identity
 from sa_hub.assembly import build_hub
 from sa_hub.hub import HubCore
@@ -98,20 +99,23 @@ def own_identity(soldier: str) -> Identity:
 
 
 def distance_m(track: Track, walk: Walk, time_ns: int) -> float:
-    """How far a receiver that moves the track on at constant velocity is from the walker."""
+    """How far a receiver that moves the track on by the common rule is from the walker."""
     east, north, _, _ = walk.at((time_ns - START_NS) / S)
     elapsed_s = (time_ns - track.time_ns) / S
     shown_east = (track.longitude_deg - ORIGIN.longitude_deg) * _METRES_PER_DEG_EAST
     shown_north = (track.latitude_deg - ORIGIN.latitude_deg) * _METRES_PER_DEG
     return math.hypot(
-        shown_east + elapsed_s * track.east_velocity_m_s - east,
-        shown_north + elapsed_s * track.north_velocity_m_s - north,
+        shown_east + moved_m(track.east_velocity_m_s, 0.0, elapsed_s)[0] - east,
+        shown_north + moved_m(0.0, track.north_velocity_m_s, elapsed_s)[1] - north,
     )
 
 
 @dataclass
 class Air:
-    """The radio nets between hubs; every frame reaches all others on its link, or not, sooner or later."""
+    """The radio nets between hubs; every frame reaches all others on its link, or not, sooner or later.
+
+    Who is in ``cut_off`` neither reaches anybody nor is reached.
+    """
 
     hubs: dict[str, HubCore]
     loss: float = 0.0
@@ -122,6 +126,7 @@ class Air:
     published: list[tuple[str, bytes]] = field(default_factory=list)
     tracks: dict[tuple[str, str], Track] = field(default_factory=dict)
     outputs: list[tuple[str, Envelope]] = field(default_factory=list)
+    cut_off: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self._random = random.Random(self.seed)
@@ -163,6 +168,8 @@ class Air:
             self.log.append((self.now_ns, sender, frame.link, frame.data))
             for name, links in self._links.items():
                 if name == sender or frame.link not in links or self._random.random() < self.loss:
+                    continue
+                if not self.cut_off.isdisjoint((sender, name)):
                     continue
                 due_ns = self.now_ns + round((0.03 + self.jitter_s * self._random.random()) * S)
                 heapq.heappush(self._flying, (due_ns, len(self.log), name, frame.link, frame.data))

@@ -48,6 +48,8 @@ def values(info: inspect.Type) -> st.SearchStrategy[Any]:
             )
         case inspect.DictType(key_type=key, value_type=value):
             return st.dictionaries(values(key), values(value), max_size=5)
+        case inspect.StructType():
+            return structs(info)
     raise NotImplementedError(f"no strategy for {info}")
 
 
@@ -72,9 +74,14 @@ def messages(type_: type[m.Message]) -> st.SearchStrategy[Any]:
         return imu_batches()
     info = inspect.type_info(type_)
     assert isinstance(info, inspect.StructType)
+    return structs(info)
+
+
+def structs(info: inspect.StructType) -> st.SearchStrategy[Any]:
+    """Instances of a struct, optional fields present or not."""
     required = {field.name: values(field.type) for field in info.fields if field.required}
     optional = {field.name: values(field.type) for field in info.fields if not field.required}
-    return st.fixed_dictionaries(required, optional=optional).map(lambda fields: type_(**fields))
+    return st.fixed_dictionaries(required, optional=optional).map(lambda fields: info.cls(**fields))
 
 
 def addresses(subject: str) -> st.SearchStrategy[Address]:
@@ -88,5 +95,11 @@ envelopes: st.SearchStrategy[Envelope] = st.sampled_from(TOPICS).flatmap(
 
 
 def plain(message: m.Message) -> dict[str, Any]:
-    """A message's fields by name."""
-    return msgspec.structs.asdict(message)
+    """A message's fields by name, structs in them likewise."""
+    return {name: _plain(value) for name, value in msgspec.structs.asdict(message).items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    return msgspec.structs.asdict(value) if isinstance(value, msgspec.Struct) else value

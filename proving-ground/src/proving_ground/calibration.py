@@ -11,6 +11,7 @@ import typer
 
 from bootprint.config import load_computer
 from bootprint.errors import ConfigError, RecordingError
+from proving_ground.compass_calibration import compass
 
 if TYPE_CHECKING:
     from bootprint.messages import Float64Array
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
 
 
 def register(app: typer.Typer) -> None:
-    """Add ``calibrate`` with its one command."""
+    """Add ``calibrate`` with its commands."""
     group = typer.Typer(help="Calibrate sensors from a recording.", no_args_is_help=True)
     group.command("foot-magnetometer")(foot_magnetometer)
-    group.callback()(lambda: None)  # one command alone would be taken for the group itself
+    group.command("compass")(compass)
     app.add_typer(group, name="calibrate")
 
 

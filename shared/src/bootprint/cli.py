@@ -38,6 +38,16 @@ def build_app() -> typer.Typer:
     return app
 
 
+def group(app: typer.Typer, name: str, summary: str) -> typer.Typer:
+    """The group of commands of that name; made, with its help, by the first room that asks for it."""
+    for registered in app.registered_groups:
+        if registered.name == name and registered.typer_instance is not None:
+            return registered.typer_instance
+    made = typer.Typer(help=summary, no_args_is_help=True)
+    app.add_typer(made, name=name)
+    return made
+
+
 def main() -> None:
     """The console script: one line and exit 2 on anything a person can mend."""
     try:

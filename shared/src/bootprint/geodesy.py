@@ -12,6 +12,7 @@ _SEMI_MAJOR_M = 6_378_137.0
 _FLATTENING = 1.0 / 298.257223563
 _ECCENTRICITY_SQUARED = _FLATTENING * (2.0 - _FLATTENING)
 _SECOND_ECCENTRICITY_SQUARED = _ECCENTRICITY_SQUARED / (1.0 - _ECCENTRICITY_SQUARED)
+_POLE_COSINE = 1e-9  # of latitude: nearer to a pole east and north mean nothing
 _SEMI_MINOR_M = _SEMI_MAJOR_M * (1.0 - _FLATTENING)
 
 
@@ -112,12 +113,32 @@ def ground_offset(
     times as fast as a change of frames.
     """
     middle = math.radians(0.5 * (from_deg[0] + to_deg[0]))
-    flattening = 1.0 - _ECCENTRICITY_SQUARED * math.sin(middle) ** 2
-    normal_m = _SEMI_MAJOR_M / math.sqrt(flattening)
-    meridian_m = normal_m * (1.0 - _ECCENTRICITY_SQUARED) / flattening
+    normal_m, meridian_m = _radii_m(middle)
     turn = wrap_angle(math.radians(to_deg[1] - from_deg[1]))
     east = (normal_m + height_m) * math.cos(middle) * turn
     return east, (meridian_m + height_m) * math.radians(to_deg[0] - from_deg[0])
+
+
+def moved_place(from_deg: tuple[float, float], east_m: float, north_m: float) -> tuple[float, float]:
+    """The (latitude, longitude) so many metres away on the ground: the inverse of `ground_offset`, up to some km.
+
+    Held at the poles; longitude within ±180°.
+    """
+    latitude_deg, longitude_deg = from_deg
+    for _ in range(2):  # the radii are those of the middle latitude, which the first pass tells
+        middle = math.radians(0.5 * (from_deg[0] + latitude_deg))
+        normal_m, meridian_m = _radii_m(middle)
+        latitude_deg = from_deg[0] + math.degrees(north_m / meridian_m)
+    turn = east_m / (normal_m * max(math.cos(middle), _POLE_COSINE))
+    longitude_deg = math.degrees(wrap_angle(math.radians(longitude_deg) + turn))
+    return max(-90.0, min(90.0, latitude_deg)), longitude_deg
+
+
+def _radii_m(latitude_rad: float) -> tuple[float, float]:
+    """Radii of curvature east-west (normal) and north-south (meridian)."""
+    flattening = 1.0 - _ECCENTRICITY_SQUARED * math.sin(latitude_rad) ** 2
+    normal_m = _SEMI_MAJOR_M / math.sqrt(flattening)
+    return normal_m, normal_m * (1.0 - _ECCENTRICITY_SQUARED) / flattening
 
 
 def major_axis_sigma_m(ee: float, en: float, nn: float) -> float:

@@ -32,6 +32,30 @@ FixKind = Literal["none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "dead_r
 MotionClass = Literal["standing", "walking", "running", "stairs", "crawling", "unknown"]
 Direction = Literal["forward", "left", "backward", "right"]
 Mode = Literal["unplaced", "gnss", "boots", "body", "camera", "coasting", "lost"]
+ObservationCode = Literal[
+    "infantry",
+    "vehicle",
+    "armour",
+    "artillery",
+    "aircraft",
+    "drone",
+    "sniper",
+    "ied",
+    "mine",
+    "obstacle",
+    "casualty",
+    "civilian",
+    "rally_point",
+    "landing_zone",
+    "supply",
+    "entrance",
+    "building",
+    "route",
+]
+HARMLESS_CODES: frozenset[ObservationCode] = frozenset(
+    ("casualty", "civilian", "rally_point", "landing_zone", "supply", "entrance", "building", "route")
+)
+"""Things observed that nobody means to shoot at."""
 TrackState = Literal["fresh", "stale", "lost"]
 ServiceState = Literal["starting", "ok", "degraded", "failed", "stopped"]
 
@@ -222,7 +246,13 @@ class FootPose(Message, frozen=True):
 
 
 class BodyStep(Message, frozen=True):
-    """One step seen by a body-worn unit (compass, gyro, barometer)."""
+    """One step seen by a body-worn unit (compass, gyro, barometer).
+
+    ``azimuth_rad`` is where the step led, ``direction`` how the feet went against where the body faces;
+    ``class_pct`` is the probability of motion and direction. ``floor`` counts from where the walk began. Redundancy
+    percentages say how much of the information is checked by other information; ``external_reliability_m`` what
+    disturbances that nobody noticed may have done to the place since the last absolute fix.
+    """
 
     start_time_ns: TimeNs
     length_m: NonNegative
@@ -235,6 +265,14 @@ class BodyStep(Message, frozen=True):
     gyro_azimuth_rad: float | None = None
     gnss_azimuth_rad: float | None = None
     azimuth_redundancy_pct: Percent | None = None
+    direction: Direction | None = None
+    class_pct: Percent | None = None
+    height_sigma_m: NonNegative | None = None
+    floor: int | None = None
+    floor_pct: Percent | None = None
+    planimetry_redundancy_pct: Percent | None = None
+    altimetry_redundancy_pct: Percent | None = None
+    external_reliability_m: NonNegative | None = None
 
 
 class Fix(Message, frozen=True):
@@ -277,7 +315,11 @@ class Position(Message, frozen=True):
 
 
 class Track(Message, frozen=True):
-    """A hub's knowledge of one soldier; ``time_ns`` is the time of the position, not of its arrival."""
+    """A hub's knowledge of one soldier; ``time_ns`` is the time of the position, not of its arrival.
+
+    ``held_m`` and ``held_s``: how well (one sigma), up to which age, reports of late have kept the prediction of
+    this net's soldiers right; what that means for the doubt at an age, `bootprint.display` tells.
+    """
 
     soldier: Name
     number: Annotated[int, msgspec.Meta(ge=0, le=1023)]
@@ -294,10 +336,18 @@ class Track(Message, frozen=True):
     received_ns: TimeNs | None = None
     via: Name = "own"
     hops: Count = 0
+    held_m: NonNegative | None = None
+    held_s: NonNegative | None = None
 
 
 class LinkReport(Message, frozen=True):
-    """What one radio link carried; bits of the air, the link's header bytes included, in event time."""
+    """What one radio link carried; bits of the air, the link's header bytes included, in event time.
+
+    ``drops``: what was refused, by cause. ``airtime_share``: of the last hour. ``duty_left_s``: airtime that a duty
+    cycle still allows in this hour; None without one. ``frames_waiting``: 1 while one waits for its bits or modem.
+    By soldier: ``ages_s``, how old the net's newest report is, and ``expected_errors_m``, how far off receivers are
+    believed to show them now (None: some of them do not know the soldier).
+    """
 
     link: Name
     budget_bits_per_s: NonNegative
@@ -308,6 +358,12 @@ class LinkReport(Message, frozen=True):
     frames_lost: Count
     bytes_sent: Count
     bytes_received: Count
+    drops: dict[str, Count] = {}
+    airtime_share: NonNegative | None = None
+    duty_left_s: NonNegative | None = None
+    frames_waiting: Count | None = None
+    ages_s: dict[str, float] = {}
+    expected_errors_m: dict[str, NonNegative | None] = {}
 
 
 class Alert(Message, frozen=True):
@@ -319,13 +375,14 @@ class Alert(Message, frozen=True):
 
 
 class Observation(Message, frozen=True):
-    """A thing seen, with its place."""
+    """A thing seen, with its place: what it is by a code, or by the text, or both."""
 
     soldier: Name
     latitude_deg: Latitude
     longitude_deg: Longitude
     accuracy_m: NonNegative
     text: Annotated[str, msgspec.Meta(max_length=200)] = ""
+    code: ObservationCode | None = None
 
 
 class Status(Message, frozen=True):

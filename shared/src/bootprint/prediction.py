@@ -8,6 +8,9 @@ People stop and turn, so a velocity is believed less the older it is: the predic
 import math
 from typing import Final
 
+import numpy as np
+import numpy.typing as npt
+
 DAMPING_S: Final = 60.0
 """Time constant τ after which a reported velocity has lost 63 % of its say."""
 
@@ -20,3 +23,10 @@ def moved_m(east_m_s: float, north_m_s: float, elapsed_s: float) -> tuple[float,
     """
     reach_s = elapsed_s if elapsed_s <= 0.0 else -DAMPING_S * math.expm1(-elapsed_s / DAMPING_S)
     return east_m_s * reach_s, north_m_s * reach_s
+
+
+def reaches_s(elapsed_s: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The same rule for many: seconds by which each velocity is to be multiplied, of the shape of ``elapsed_s``."""
+    return np.where(
+        elapsed_s <= 0.0, elapsed_s, -DAMPING_S * np.expm1(-np.maximum(elapsed_s, 0.0) / DAMPING_S)
+    )

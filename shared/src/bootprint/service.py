@@ -30,9 +30,9 @@ from bootprint.topics import Identity
 from bootprint.zenoh_bus import Inlet, ZenohBus, open_bus
 
 _INBOX_SIZE = 20_000
-_FETCH_S = 0.05  # event time between two looks at the bus: fewer wake-ups are what many processes live on
+_FETCH_S = 0.1  # event time between two looks at the bus: fewer wake-ups are what many processes live on
 _LEAST_FETCH_S = 0.002
-_TICK_S = 0.05
+_TICK_S = 0.1
 _HEALTH_S = 1.0
 EXIT_BAD_INPUT = 2
 

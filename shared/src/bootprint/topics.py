@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
 
+from bootprint import awareness as aware
 from bootprint import messages as m
 from bootprint.errors import WireError
 
@@ -55,11 +56,24 @@ TOPICS: tuple[Topic, ...] = (
     Topic("body_step", m.BodyStep, Qos.ASSURED, None, "pdr-engine", True, "steps of the body-worn unit"),
     Topic("fix", m.Fix, Qos.ASSURED, None, "people", True, "a place given by a person"),
     Topic("position", m.Position, Qos.ASSURED, 5.0, "fusion", True, "the soldier's fused position"),
+    Topic(
+        "aim", aware.Aim, Qos.STREAM, None, "weapon sensors, tools", True, "where a soldier's weapon points"
+    ),
     Topic("track", m.Track, Qos.STATE, None, "sa-hub", True, "a hub's picture of one soldier"),
     Topic("link", m.LinkReport, Qos.STATE, 1.0, "sa-hub", True, "what a radio link carried"),
     Topic("alert", m.Alert, Qos.ASSURED, None, "sa-hub", True, "alerts"),
     Topic("observation", m.Observation, Qos.ASSURED, None, "sa-hub", True, "observations"),
     Topic("status", m.Status, Qos.STATE, None, "sa-hub", True, "soldiers' condition"),
+    Topic(
+        "friendly_warning",
+        aware.FriendlyWarning,
+        Qos.STATE,
+        None,
+        "sa-hub",
+        True,
+        "a friendly is near, or in the line of a weapon; source: the friendly",
+    ),
+    Topic("contacts", aware.Contacts, Qos.STATE, 0.2, "sa-hub", True, "who is known to whom"),
     Topic("health", m.Health, Qos.STATE, 1.0, "all", True, "processes' state and counts"),
 )
 BY_SUBJECT: dict[str, Topic] = {topic.subject: topic for topic in TOPICS}

@@ -231,6 +231,18 @@ class ZenohBus:
         """Call ``handler(key, payload)`` from a thread with everything that matches, valid or not."""
         self._spawn(self._plain_subscriber, selector, handler)
 
+    def raw_publisher(self, key: str) -> Callable[[bytes], None]:
+        """A function that puts bytes on a key that is no topic, dropped when congested; it may raise BusError."""
+        publisher = self._session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
+
+        def put(payload: bytes) -> None:
+            try:
+                publisher.put(payload)
+            except zenoh.ZError as error:
+                raise BusError(f"cannot publish {key}: {_first_line(error)}") from error
+
+        return put
+
     def _plain_subscriber(self, selector: str) -> _Subscriber:
         return self._session.declare_subscriber(selector, self._channel())
 

@@ -20,6 +20,10 @@ import typer
 
 from bootprint.commands.options import Json, write_json
 from bootprint.errors import BootprintError
+from proving_ground.evaluation.hub_benchmark import hub
+from proving_ground.evaluation.limits import Limit, limits_table
+from proving_ground.evaluation.warning_benchmark import warnings
+from proving_ground.radio_budgets import budgets
 from sensor_gateway.recordings.run import FEET, ImuSeries
 
 if TYPE_CHECKING:
@@ -45,27 +49,6 @@ class FootFigures:
     resident_mb: float
 
 
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """A bound on one figure; ``at_least`` turns it round."""
-
-    figure: str
-    meaning: str
-    bound: float
-    unit: str
-    at_least: bool = False
-
-    @property
-    def bounds(self) -> str:
-        """The bound as people write it."""
-        return f"{'≥' if self.at_least else '≤'} {self.bound:g} {self.unit}"
-
-    def holds(self, figures: FootFigures) -> bool:
-        """Whether the figure keeps the bound."""
-        value: float = getattr(figures, self.figure)
-        return value >= self.bound if self.at_least else value <= self.bound
-
-
 LIMITS = (
     Limit("us_batches", f"a sample, in batches of {_BATCH}", 1.5, "µs"),
     Limit("us_one_pass", "a sample, in one pass", 1.5, "µs"),
@@ -79,8 +62,14 @@ LIMITS = (
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(no_args_is_help=True, help="What the estimators cost.")
+    from proving_ground.evaluation.body_benchmark import body
+
+    group = typer.Typer(no_args_is_help=True, help="What the parts cost, and whether budgets hold.")
     group.command()(foot)
+    group.command()(body)
+    group.command()(hub)
+    group.command()(budgets)
+    group.command()(warnings)
     app.add_typer(group, name="benchmark")
 
 
@@ -229,18 +218,9 @@ def _resident_mb(pid: int) -> float:
 def show(figures: FootFigures) -> None:
     """The figures as a table, each beside its limit."""
     from rich.console import Console
-    from rich.table import Table
 
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("figure", "limit", ""):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("of the foot INS")
-    for limit in LIMITS:
-        verdict = "[green]holds[/green]" if limit.holds(figures) else "[red]missed[/red]"
-        value = f"{getattr(figures, limit.figure):.2f} {limit.unit}"
-        table.add_row(value, limit.bounds, verdict, limit.meaning)
     console = Console()
-    console.print(table)
+    console.print(limits_table(figures, LIMITS, "of the foot INS"))
     console.print(
         f"{figures.states} states over {figures.samples} samples; "
         f"the textbook's 9 states in NumPy: {figures.us_textbook:.0f} µs a sample.",

@@ -32,7 +32,7 @@ _IDENTITY = Identity("evaluate", "evaluate", "evaluate")
 _ORIGIN = Origin(latitude_deg=0.0, longitude_deg=0.0)  # any: only local coordinates are compared
 _NS_PER_S = 1e9
 # Kinds that an estimator exists for; the others say so instead of pretending.
-KINDS: tuple[Kind, ...] = ("foot", "dual")
+KINDS: tuple[Kind, ...] = ("foot", "dual", "body")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One row to be: a run, the place (left_foot, right_foot) and the method."""
+    """One row to be: a run, the place (left_foot, right_foot, body) and the method."""
 
     run: Run
     kind: Kind
@@ -72,25 +72,37 @@ class Evaluated:
 
 
 def methods_of(choice: str | None) -> tuple[str, ...]:
-    """The methods to run: the default one, the one named, or all; ConfigError on an unknown name."""
-    from pdr_engine.foot import METHODS, FootSettings
+    """The methods to run: each kind's default, the one named, or all; ConfigError on an unknown name."""
+    from pdr_engine.body.methods import DEFAULT
+    from pdr_engine.foot import FootSettings
 
     if choice is None:
-        return (FootSettings().method,)
+        return (FootSettings().method, DEFAULT)
+    known = tuple(dict.fromkeys(name for kind in KINDS for name in _known_to(kind)))
     if choice == ALL:
-        return METHODS
-    if choice not in METHODS:
-        raise ConfigError(f"--method {choice!r} is unknown; known: {', '.join((*METHODS, ALL))}")
+        return known
+    if choice not in known:
+        raise ConfigError(f"--method {choice!r} is unknown; known: {', '.join((*known, ALL))}")
     return (choice,)
+
+
+def _known_to(kind: Kind) -> tuple[str, ...]:
+    """The methods that a kind's estimator has."""
+    from pdr_engine.body.methods import METHODS as BODY_METHODS
+    from pdr_engine.foot import METHODS
+
+    return BODY_METHODS if kind == "body" else METHODS
 
 
 def plan(runs: Sequence[Run], kind: Kind | None, methods: Sequence[str]) -> list[Task]:
     """Every row to compute, in order: runs, then places, then methods; ConfigError if there is none."""
     tasks = [task for run in runs for task in _tasks(run, kind or run.kind, methods)]
     if not tasks:
-        found = ", ".join(sorted({kind or run.kind for run in runs}))
+        found = sorted({kind or run.kind for run in runs})
+        known = ", ".join(f"{one} ({', '.join(_known_to(one))})" for one in KINDS)
         raise ConfigError(
-            f"nothing to evaluate: no estimator for kind {found} yet (there are: {', '.join(KINDS)})"
+            f"nothing to evaluate: no estimator for kind {', '.join(found)} with method "
+            f"{', '.join(methods)}; there are: {known}"
         )
     return tasks
 
@@ -98,6 +110,11 @@ def plan(runs: Sequence[Run], kind: Kind | None, methods: Sequence[str]) -> list
 def _tasks(run: Run, kind: Kind, methods: Sequence[str]) -> Iterator[Task]:
     if kind not in KINDS:
         structlog.get_logger().warning("evaluate.no_estimator_yet", run=run.name, kind=kind)
+        return
+    methods = [method for method in methods if method in _known_to(kind)]
+    if kind == "body":
+        for method in methods:
+            yield Task(run, kind, BODY, method, run.name)
         return
     places = [place for place in FEET if place in run.imus]
     for place in places:
@@ -111,15 +128,18 @@ def _tasks(run: Run, kind: Kind, methods: Sequence[str]) -> Iterator[Task]:
 
 def evaluate_task(task: Task, align: Align) -> Evaluated:
     """Run one task: estimate, score, and put the figures into a row."""
-    estimate = (
-        estimate_fused(task.run, task.method)
-        if task.place == FUSED
-        else estimate_foot(task.run.imus[task.place], task.method)
-    )
+    estimate = _estimate(task)
     truth = task.run.truth_of(BODY if task.place == FUSED else task.place)
     scored = score_track(estimate.track, truth, align, estimate.steps)
     strides_true = true_strides(truth) if truth is not None and task.place in task.run.truth else None
     return Evaluated(task, estimate, scored, _row(task, estimate, scored, strides_true))
+
+
+def _estimate(task: Task) -> Estimate:
+    if task.place == FUSED:
+        return estimate_fused(task.run, task.method)
+    imu = task.run.imus[task.place]
+    return estimate_body(imu, task.method) if task.place == BODY else estimate_foot(imu, task.method)
 
 
 def _row(task: Task, estimate: Estimate, scored: Scored, strides_true: int | None) -> Row:
@@ -166,6 +186,21 @@ def estimate_foot(imu: ImuSeries, method: str) -> Estimate:
         samples=len(time_ns),
         seconds=seconds,
         told=steps,
+    )
+
+
+def estimate_body(imu: ImuSeries, method: str) -> Estimate:
+    """The body-worn unit through its navigator, batch by batch as on the bus."""
+    from pdr_engine.body.methods import settings_of
+    from proving_ground.evaluation.body import body_chain, body_track, walk_body
+
+    walk = walk_body(imu, settings_of(method))
+    return Estimate(
+        track=body_track(walk.steps, imu),
+        steps=body_chain(walk.steps),
+        strides=len(walk.steps),
+        samples=len(imu.time_s),
+        seconds=walk.seconds,
     )
 
 

@@ -14,6 +14,12 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+
+from sa_hub.radio.medium import Medium
+from sa_hub.radio.profiles import named
 
 _RECEIVE_BYTES = 2048
 _MAX_WAIT_S = 0.2
@@ -29,6 +35,32 @@ class NetProfile:
     loss: float = 0.0
     header_bytes: int = 0
     seed: int = 1
+    profile: str | None = None
+    """A named radio, whose key-up, slots and symbols take their time on the air."""
+
+    @classmethod
+    def of_radio(cls, name: str, radio: str | None, **own: Any) -> "NetProfile":
+        """A net of a named radio (plain UDP if None); what is given of its own goes before the radio's figures."""
+        given = {key: value for key, value in own.items() if value is not None}
+        return cls(name, profile=radio, **(_figures(named(radio or "udp")) | given))
+
+    @property
+    def medium(self) -> Medium:
+        """What a frame costs here."""
+        rate = max(1, round(self.rate_bits_per_s))
+        if self.profile is not None:
+            radio = named(self.profile)
+            return msgspec.structs.replace(radio, rate_bits_per_s=rate, header_bytes=self.header_bytes)
+        return Medium(rate_bits_per_s=rate, header_bytes=self.header_bytes, mtu_bytes=_RECEIVE_BYTES)
+
+
+def _figures(radio: Medium) -> dict[str, Any]:
+    """What a net takes over from a radio."""
+    return {
+        "rate_bits_per_s": float(radio.rate_bits_per_s),
+        "latency_s": radio.latency_s,
+        "header_bytes": radio.header_bytes,
+    }
 
 
 @dataclass
@@ -65,6 +97,7 @@ class Air:
         zero_s: float = math.inf,
     ) -> None:
         self.profile = profile
+        self._medium = profile.medium
         self.counts = NetCounts()
         self.zero_s = zero_s
         self._members = tuple(members)
@@ -75,7 +108,7 @@ class Air:
 
     def transmit(self, sender: str, datagram: bytes, now_s: float) -> None:
         """A member sends: the datagram takes its time on the air, then the others hear it or do not."""
-        size = len(datagram) + self.profile.header_bytes
+        size = self._medium.air_bytes(len(datagram))
         self._free_at_s = max(self._free_at_s, now_s) + 8.0 * size / self.profile.rate_bits_per_s
         due_s = self._free_at_s + self.profile.latency_s
         self.counts.datagrams += 1

@@ -174,7 +174,13 @@ class Exercise:
         return "squad_leader" if role in _RELAYING_ROLES else "soldier"
 
     def budget(self, net: Net, computer: str) -> int:
-        """What a computer may spend on a net, bit/s: its share of the net's rate, a relay's thrice a soldier's."""
+        """What a computer may spend on a net, bit/s: its share of the net's rate, a relay's thrice a soldier's.
+
+        Never more than the radio itself allows one sender (a duty cycle).
+        """
+        return min(self._share_bits_per_s(net, computer), net.profile.medium.sustained_bits_per_s)
+
+    def _share_bits_per_s(self, net: Net, computer: str) -> int:
         if net.budget_bits_per_s is not None:
             return net.budget_bits_per_s
         weights = {

@@ -110,6 +110,8 @@ def hub_section(exercise: Exercise, computer: str, ports: Ports | None = None) -
             "rate_bits_per_s": exercise.budget(net, computer),
             "header_bytes": net.profile.header_bytes,
         }
+        if net.profile.profile is not None:
+            link["profile"] = net.profile.profile
         if ports is not None:
             link["bind"] = f"127.0.0.1:{ports.members[name][computer]}"
             link["peers"] = [f"127.0.0.1:{ports.nets[name]}"]

@@ -11,12 +11,14 @@ import numpy.typing as npt
 
 from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
+from bootprint.display import Held, held_of, sigma_m
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import FootStep, Health, LinkReport, Position, Track
 
 FloatArray = npt.NDArray[np.float64]
 WATCHED = ("foot_step", "position", "track", "link", "health")
-_COLUMNS = 6
+_COLUMNS = 8
+_UNKNOWN = Held(math.nan, math.nan)
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class Told:
     """A computer's reports of one soldier in the order of their arrival, times s from the exercise's zero.
 
     ``arrived_s``, ``stamp_s``, ``accuracy_m`` (one sigma) and ``floor`` (NaN if unknown) are (n,); ``place_m`` and
-    ``velocity_m_s`` (n, 2) are east and north.
+    ``velocity_m_s`` (n, 2) are east and north. ``held_m`` and ``held_s`` (n,) are the tracks' own (NaN if unknown).
     """
 
     arrived_s: FloatArray
@@ -33,10 +35,17 @@ class Told:
     velocity_m_s: FloatArray
     accuracy_m: FloatArray
     floor: FloatArray
+    held_m: FloatArray
+    held_s: FloatArray
+
+    def sigma_m(self, index: int, age_s: float) -> float:
+        """One sigma of the place believed so long after a report, as a display shows it."""
+        held = Held(float(self.held_m[index]), float(self.held_s[index]))
+        return sigma_m(float(self.accuracy_m[index]), age_s, None if math.isnan(held.sigma_m) else held)
 
 
 class ReportLog:
-    """The reports of one soldier: sixty-four bytes each, for a company has millions."""
+    """The reports of one soldier: eighty bytes each, for a company has millions."""
 
     def __init__(self) -> None:
         self._times_ns = array("q")
@@ -49,7 +58,10 @@ class ReportLog:
         velocity = track.east_velocity_m_s, track.north_velocity_m_s
         floor = math.nan if track.floor is None else float(track.floor)
         self._times_ns.extend((arrived_ns, track.time_ns))
-        self._values.extend((east_m, north_m, *velocity, track.accuracy_m, floor))
+        held = held_of(track) or _UNKNOWN
+        self._values.extend(
+            (east_m, north_m, *velocity, track.accuracy_m, floor, held.sigma_m, held.silence_s)
+        )
 
     def __len__(self) -> int:
         return len(self._times_ns) // 2
@@ -58,7 +70,7 @@ class ReportLog:
         """All of them as arrays."""
         times = (np.array(self._times_ns, dtype=np.int64).reshape(-1, 2) - start_ns) / NS_PER_S
         values = np.array(self._values, dtype=np.float64).reshape(-1, _COLUMNS)
-        return Told(times[:, 0], times[:, 1], values[:, 0:2], values[:, 2:4], values[:, 4], values[:, 5])
+        return Told(times[:, 0], times[:, 1], values[:, 0:2], values[:, 2:4], *values[:, 4:].T)
 
 
 @dataclass

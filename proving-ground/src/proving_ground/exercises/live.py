@@ -9,6 +9,7 @@ from rich.table import Table
 
 from bootprint.clock import NS_PER_S
 from bootprint.messages import Position, Track
+from bootprint.prediction import moved_m
 from proving_ground.exercises.exercise import Soldier
 from proving_ground.exercises.score import truth_at
 from proving_ground.exercises.stage import Stage
@@ -92,10 +93,8 @@ class LiveView:
         east_m, north_m, _ = self._stage.frame.to_enu(
             track.latitude_deg, track.longitude_deg, track.height_m or self._stage.frame.origin.height_m
         )
-        off_m = math.hypot(
-            east_m + ahead_s * track.east_velocity_m_s - position.east_m,
-            north_m + ahead_s * track.north_velocity_m_s - position.north_m,
-        )
+        gone_east_m, gone_north_m = moved_m(track.east_velocity_m_s, track.north_velocity_m_s, ahead_s)
+        off_m = math.hypot(east_m + gone_east_m - position.east_m, north_m + gone_north_m - position.north_m)
         return f"{age_s:.1f}", f"{off_m:.1f}"
 
     def _nets(self) -> Table:

@@ -1,8 +1,8 @@
 """The last hop's score: what every receiver believes of everybody else, each second, beside fusion and truth.
 
-A receiver moves a soldier on at constant velocity from the newest report, as the hubs do. It misses a soldier of
-whom it has no report, or none younger than ``lost_s``; it is told something false when it shows a soldier as fresh
-who is more than 10 m from there.
+A receiver moves a soldier on from the newest report by the rule that the hubs share (`bootprint.prediction`). It
+misses a soldier of whom it has no report, or none younger than ``lost_s``; it is told something false when it shows
+a soldier as fresh who is more than 10 m from there.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,13 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bootprint.display import RADIUS_95
+from bootprint.prediction import reaches_s
 from proving_ground.exercises.exercise import Exercise
 from proving_ground.exercises.heard import FloatArray, ReportLog, Told
 from proving_ground.exercises.score import Compared, Row, true_floors, truth_at
 
 _PERIOD_S = 1.0
 FALSE_M = 10.0
-_RADIUS_95 = 2.4477  # of a circular normal distribution, in its sigmas
 
 
 @dataclass(frozen=True)
@@ -32,15 +33,15 @@ class Picture:
     """A receiver's picture sampled every second, pooled over the others; all (n,) over the samples with a report.
 
     ``against_truth_m`` and ``added_m`` (against what the sender's fusion said) are errors, ``age_s`` the report's
-    age, ``accuracy_m`` its stated sigma, ``floor_right`` 1 or 0 (NaN on stairs or if no floor was told).
-    ``expected`` counts all samples, those without any report included.
+    age, ``sigma_m`` the doubt that a display shows by then, ``floor_right`` 1 or 0 (NaN on stairs or if no floor
+    was told). ``expected`` counts all samples, those without any report included.
     """
 
     time_s: FloatArray
     against_truth_m: FloatArray
     added_m: FloatArray
     age_s: FloatArray
-    accuracy_m: FloatArray
+    sigma_m: FloatArray
     floor_right: FloatArray
     expected: int
 
@@ -50,11 +51,11 @@ def sample_picture(
 ) -> Picture:
     """What a receiver believed of each of the ``others`` at every second at which they have a fused position."""
     parts = [_sample(reports, compared, start_ns, exercise) for compared in others]
-    time_s, against_truth_m, added_m, age_s, accuracy_m, floor_right = (
+    time_s, against_truth_m, added_m, age_s, sigma_m, floor_right = (
         np.concatenate([part[0][index] for part in parts] or [np.empty(0)]) for index in range(6)
     )
     expected = sum(part[1] for part in parts)
-    return Picture(time_s, against_truth_m, added_m, age_s, accuracy_m, floor_right, expected)
+    return Picture(time_s, against_truth_m, added_m, age_s, sigma_m, floor_right, expected)
 
 
 def _sample(
@@ -75,7 +76,7 @@ def _columns(
 ) -> tuple[FloatArray, ...]:
     newest = np.searchsorted(told.arrived_s, seconds, side="right") - 1
     age_s = seconds - told.stamp_s[newest]
-    believed_m = told.place_m[newest] + age_s[:, None] * told.velocity_m_s[newest]
+    believed_m = told.place_m[newest] + reaches_s(age_s)[:, None] * told.velocity_m_s[newest]
     true_m = truth_at(compared.soldier.truth, seconds)[:, :2]
     fused_m = compared.track.at(seconds)[:, :2]
     floor, true_floor = told.floor[newest], true_floors(compared.soldier.truth, seconds, exercise)
@@ -85,7 +86,7 @@ def _columns(
         np.linalg.norm(compared.to_truth(believed_m) - true_m, axis=1),
         np.linalg.norm(believed_m - fused_m, axis=1),
         age_s,
-        told.accuracy_m[newest],
+        np.array([told.sigma_m(index, age) for index, age in zip(newest, age_s, strict=True)]),
         np.where(unknown, np.nan, floor == true_floor),
     )
 
@@ -95,7 +96,7 @@ def picture_row(receiver: str, picture: Picture, ages: Ages) -> Row:
     known = picture.age_s < ages.lost_s
     fresh = picture.age_s < ages.stale_s
     false = fresh & (picture.against_truth_m > FALSE_M)
-    inside = picture.against_truth_m <= _RADIUS_95 * picture.accuracy_m
+    inside = picture.against_truth_m <= RADIUS_95 * picture.sigma_m
     floors = picture.floor_right[np.isfinite(picture.floor_right)]
     return {
         "receiver": receiver,

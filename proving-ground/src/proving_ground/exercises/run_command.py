@@ -24,7 +24,7 @@ Set = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="A parameter: net.loss, net.rate_bits_per_s, hub.threshold_m, fusion.…, pdr.… May be repeated.",
+        help="A parameter: net.loss, net.profile, net.latency_s, hub.threshold_m, fusion.…, pdr.… May be repeated.",
     ),
 ]
 

@@ -17,7 +17,7 @@ from sensor_gateway.recordings.run import FEET, ImuSeries, Run, Truth
 _SECTIONS = ("net", "hub", "pdr", "fusion")
 _NET_KEYS = tuple(field.name for field in fields(NetProfile) if field.name not in ("name", "seed"))
 _NET_LIMITS = {
-    "rate_bits_per_s": (100.0, 1e9),
+    "rate_bits_per_s": (75.0, 1e9),
     "latency_s": (0.0, 60.0),
     "loss": (0.0, 0.9),
     "header_bytes": (0, 200),
@@ -55,11 +55,23 @@ def with_loss(exercise: Exercise, loss: float | None) -> Exercise:
 def _with_net(exercise: Exercise, key: str, value: Any) -> Exercise:
     if key not in _NET_KEYS:
         raise ConfigError(f"--set net.{key}: unknown; known: {', '.join(_NET_KEYS)}")
+    if key == "profile":
+        return _with_radio(exercise, str(value))
     low, high = _NET_LIMITS[key]
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise ConfigError(f"--set net.{key}={value}: want a number from {low:g} to {high:g}")
     changed: dict[str, Any] = {key: value}
     nets = tuple(replace(net, profile=replace(net.profile, **changed)) for net in exercise.nets)
+    return replace(exercise, nets=nets)
+
+
+def _with_radio(exercise: Exercise, radio: str) -> Exercise:
+    """Every net as one of this named radio; its losses stay."""
+
+    def of_radio(old: NetProfile) -> NetProfile:
+        return NetProfile.of_radio(old.name, radio, loss=old.loss, seed=old.seed)
+
+    nets = tuple(replace(net, profile=of_radio(net.profile)) for net in exercise.nets)
     return replace(exercise, nets=nets)
 
 

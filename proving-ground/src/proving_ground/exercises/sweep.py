@@ -27,6 +27,8 @@ Settings = Mapping[str, Any]
 Figures = dict[str, float | None]
 Row = dict[str, Any]
 OnDone = Callable[[float], None]
+Job = Callable[[str, int, Sequence[Settings]], list[Figures]]
+"""Plays a seed: what is played, its seed, the settings; a function of a module, so that it travels to workers."""
 _SOLDIER_FIGURES = (
     "dead_reckoning_error_p95_m",
     "position_error_p50_m",
@@ -125,12 +127,17 @@ def aggregate(grid: Sequence[Settings], by_seed: Mapping[int, Sequence[Figures]]
 
 
 def sweep_locally(
-    scenario: str, seeds: Sequence[int], grid: Sequence[Settings], workers: int, on_done: OnDone
+    scenario: str,
+    seeds: Sequence[int],
+    grid: Sequence[Settings],
+    workers: int,
+    on_done: OnDone,
+    job: Job = play_seed,
 ) -> dict[int, list[Figures]]:
     """All jobs on this machine's processors."""
     context = multiprocessing.get_context("forkserver")
     with local.ProcessPoolExecutor(min(workers, len(seeds)), context) as pool:
-        futures = {pool.submit(play_seed, scenario, seed, grid): seed for seed in seeds}
+        futures = {pool.submit(job, scenario, seed, grid): seed for seed in seeds}
         found = {}
         for future in local.as_completed(futures):
             found[futures[future]] = future.result()
@@ -139,7 +146,12 @@ def sweep_locally(
 
 
 def sweep_on_dask(
-    scenario: str, seeds: Sequence[int], grid: Sequence[Settings], address: str, on_done: OnDone
+    scenario: str,
+    seeds: Sequence[int],
+    grid: Sequence[Settings],
+    address: str,
+    on_done: OnDone,
+    job: Job = play_seed,
 ) -> dict[int, list[Figures]]:
     """All jobs on a Dask cluster, whose workers have this package; ConfigError if it cannot be reached."""
     try:
@@ -151,7 +163,7 @@ def sweep_on_dask(
     except (OSError, ValueError) as error:
         raise ConfigError(f"--dask {address}: no scheduler answers there: {error}") from error
     with client:
-        futures = {client.submit(play_seed, scenario, seed, list(grid), pure=False): seed for seed in seeds}
+        futures = {client.submit(job, scenario, seed, list(grid), pure=False): seed for seed in seeds}
         return dict(_collected(as_completed(list(futures), loop=client.loop), futures, on_done))
 
 

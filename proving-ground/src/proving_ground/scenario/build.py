@@ -121,8 +121,9 @@ def _first_course(truth: Truth, facing: float) -> float:
 
 def _nets(scenario: Scenario, seed: int, duration_s: float) -> Iterator[Net]:
     for index, (name, net, members) in enumerate(scenario.cast.nets):
-        profile = NetProfile(
+        profile = NetProfile.of_radio(
             name,
+            net.profile,
             rate_bits_per_s=net.rate_bits_per_s,
             latency_s=net.latency_s,
             loss=net.loss,

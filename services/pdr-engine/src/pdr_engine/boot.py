@@ -10,8 +10,7 @@ from bootprint.geomagnetism import earth_field
 from bootprint.messages import FootPose, FootStep, ImuBatch, Vector3, upper_triangle
 from bootprint.topics import Address
 from pdr_engine.foot import FootEstimates, FootNavigator, FootSettings, FootStepEstimate
-
-NS_PER_S = 1_000_000_000
+from pdr_engine.rate import NS_PER_S, RateMeter
 
 
 class Boot:
@@ -36,15 +35,12 @@ class Boot:
         self._poses = 0
         self._position: Vector3 = (0.0, 0.0, 0.0)  # where the newest step ended, nav frame
         self._yaw_rad = 0.0
-        self._rate_since_ns = 0
-        self._rate_count = 0
-        self.rate_hz = 0.0
-        self.newest_ns: int | None = None
+        self._rate = RateMeter()
 
     def handle(self, batch: ImuBatch) -> Iterable[Envelope]:
         """Take a batch in; steps and poses that it makes known come out."""
         times = batch.times
-        self._measure_rate(int(times[-1]), len(times))
+        self._rate.count(int(times[-1]), len(times))
         mag = batch.mag
         if mag is not None and self._declination_rad is None:
             self._learn_earth_field(int(times[0]))
@@ -66,17 +62,19 @@ class Boot:
             self._declination_rad = field.declination_rad
 
     @property
+    def rate_hz(self) -> float:
+        """Samples a second, of the newest second."""
+        return self._rate.rate_hz
+
+    @property
+    def newest_ns(self) -> int | None:
+        """Time of the newest sample."""
+        return self._rate.newest_ns
+
+    @property
     def contradicts_itself(self) -> bool:
         """Whether accelerometer and gyro do not fit together: wrong units, or axes that are not right-handed."""
         return self._navigator.contradicts_itself
-
-    def _measure_rate(self, newest_ns: int, count: int) -> None:
-        self.newest_ns = newest_ns
-        span_ns = newest_ns - self._rate_since_ns
-        self._rate_count += count
-        if not 0 <= span_ns < NS_PER_S:
-            self.rate_hz = self._rate_count * NS_PER_S / span_ns if 0 < span_ns < 2 * NS_PER_S else 0.0
-            self._rate_since_ns, self._rate_count = newest_ns, 0
 
     def _publish(self, estimates: FootEstimates) -> Iterator[Envelope]:
         """Steps and poses in the order of their times; a step goes before the pose of its own time."""

@@ -1,23 +1,40 @@
 """The pdr-engine service: ``pdr-engine --config computer.toml``."""
 
-from bootprint.service import Context, CorePart, Part, Service
+import msgspec
+
+from bootprint.service import Context, Part, Service
 from pdr_engine.config import PdrConfig
-from pdr_engine.engine import SUBJECTS, EngineCore
+from pdr_engine.engine import BODY, SUBJECTS, EngineCore
 from pdr_engine.foot import warm_up
+from pdr_engine.profile import FILE, EnginePart, load_profile, with_profile
 
 
 def build(context: Context) -> Part:
     """The core of this computer's soldier, set up from ``[pdr]``, its kernel compiled before the first sample."""
     computer = context.computer
-    config = computer.section("pdr", PdrConfig)
+    config = _with_person(context, computer.section("pdr", PdrConfig))
     if reason := warm_up():
         context.log.warning("numba runs the foot filter in this process, in more memory", reason=reason)
-    return CorePart(EngineCore(config, computer.identity, computer.realm.origin))
+    core = EngineCore(config, computer.identity, computer.realm.origin)
+    return EnginePart(core, computer.state_dir / FILE)
+
+
+def _with_person(context: Context, config: PdrConfig) -> PdrConfig:
+    """The configuration with the saved profile of the person, if there is a sound one."""
+    path = context.computer.state_dir / FILE
+    try:
+        profile = load_profile(path) if BODY in config.places else None
+    except (OSError, ValueError) as error:
+        context.log.warning("body profile cannot be read, starting afresh", file=str(path), error=str(error))
+        return config
+    if profile is None:
+        return config
+    return msgspec.structs.replace(config, body=with_profile(config.body, profile))
 
 
 SERVICE = Service(
     name="pdr-engine",
-    summary="Dead reckoning of both boots: inertial samples in, foot steps out.",
+    summary="Dead reckoning of boots and body: inertial samples in, steps out.",
     subjects=SUBJECTS,
     build=build,
 )

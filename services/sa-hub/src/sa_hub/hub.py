@@ -10,23 +10,28 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-import msgspec
 import structlog
 
+from bootprint.awareness import Aim
 from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.config import Member, Realm
+from bootprint.display import Ages
 from bootprint.figures import Figures
-from bootprint.messages import Alert, Fix, Message, Observation, Position, Status
-from bootprint.topics import SUBJECT_OF, Address, Identity
+from bootprint.messages import HARMLESS_CODES, Alert, Fix, Message, Observation, Position, Status
+from bootprint.topics import Identity
+from sa_hub.awareness.watch import Watch
+from sa_hub.motion import Motion
 from sa_hub.own_reports import OwnReports
+from sa_hub.publishing import Publisher
 from sa_hub.radio.content import MAX_HOPS, Condition, Notice, Report, Reports, StatusNotice, one_hop_on
 from sa_hub.radio.net import RadioNet
 from sa_hub.radio.outbox import Key, key_of
 from sa_hub.radio.replay import Memory
+from sa_hub.retelling import Retelling
 from sa_hub.settings import HubSettings
-from sa_hub.tracks import CLOCK_SET_BACK_NS, Ages, Known, SenderClock, SmoothVelocity, Tracks
-from sa_hub.translate import message_of, notice_of, report_of_fix, report_of_position, track_of
+from sa_hub.tracks import CLOCK_SET_BACK_NS, Known, SenderClock, Tracks
+from sa_hub.translate import notice_of, report_of_fix, report_of_position
 
 STEP_NS: Final = 100_000_000
 STEPS_PER_S: Final = NS_PER_S // STEP_NS
@@ -51,26 +56,29 @@ class HubCore:
         self.counters: Counter[str] = Counter()
         self._settings = settings
         self._member = member
-        self._identity = Identity(realm.id, member.unit, member.id)
         self._roster = realm.by_number()
+        self._ids = {number: each.id for number, each in self._roster.items()}
+        self._publisher = Publisher(Identity(realm.id, member.unit, member.id), self._roster)
         self._nets = dict(nets)
         own_ages, ages = _ages(settings)
         self._tracks = Tracks(member.number, own_ages, ages)
+        self._watch = Watch(member, self._roster, settings.warnings, ages.stale_ns)
         self._conditions: dict[int, Condition] = {}
         self._clocks: dict[int, SenderClock] = {}
-        self._velocity = SmoothVelocity()
+        self._motion = Motion()
+        self._motions: dict[int, Motion] = {}
         self._seen: OrderedDict[Key, None] = OrderedDict()
-        self._sequences: Counter[Address] = Counter()
         self._placed: Report | None = None
         self._own = OwnReports()
+        self._retelling = Retelling(self._tracks, member.number, relays=settings.relays)
         self._now_ns = 0
         self._last_step: int | None = None
         self._frames: list[OutgoingFrame] = []
 
-    # -- the core's four entrances ----------------------------------------------------------------------------
+    # -- the core's entrances ----------------------------------------------------------------------------
 
     def handle(self, envelope: Envelope) -> list[Envelope]:
-        """A message of our own soldier: position, fix, alert, observation, status."""
+        """A message of our own soldier: position, fix, aim, alert, observation, status."""
         message = envelope.message
         if envelope.address.soldier != self._member.id:
             self.counters["foreign_messages"] += 1
@@ -78,15 +86,29 @@ class HubCore:
         match message:
             case Position():
                 self._placed = None
+                self._watch.lines.position(message, self._now_ns)
                 return self._own_report(self._report_of(message))
             case Fix():
                 return self._place(message)
+            case Aim():
+                self._watch.lines.aim(message, self._now_ns)
+                return []
             case Alert() | Observation() | Status():
                 # What we publish of others comes back from the bus under our own subtree.
                 return self._own_notice(message) if message.soldier == self._member.id else []
             case _:
                 self.counters["foreign_messages"] += 1
                 return []
+
+    def take_in(self, position: Position, number: int) -> list[Envelope]:
+        """Another soldier's fused position that came whole, by a way without frames: for a relay to tell on."""
+        velocity = self._motions.setdefault(number, Motion()).update(position)
+        report = report_of_position(position, number, velocity, self._conditions.get(number, "ok"))
+        known = self._tracks.update(report, max(self._now_ns, report.time_ns), "bus")
+        if known is None:
+            self.counters["positions_out_of_order"] += 1
+            return []
+        return [self._track(known)]
 
     def receive(self, link: str, datagram: bytes, now_ns: int) -> list[Envelope]:
         """A datagram from a link, arrived at ``now_ns`` of event time; anything may be in it."""
@@ -97,6 +119,7 @@ class HubCore:
         if heard is None:
             return outputs
         sender, content = heard
+        self._watch.contacts.heard(sender, link, self._now_ns)
         if isinstance(content, Reports):
             return outputs + self._heard_reports(sender, content.reports, link)
         return outputs + self._heard_notice(content, link)
@@ -116,6 +139,10 @@ class HubCore:
         """The names of the hub's radio nets."""
         return tuple(self._nets)
 
+    def hold(self, link: str, *, busy: bool) -> None:
+        """Whether a link can take a frame now; until it can, its net keeps back what is due."""
+        self._nets[link].hold(busy=busy)
+
     def memory(self, link: str) -> Memory:
         """What was heard on a link, for keeping over a restart."""
         return self._nets[link].opener.memory
@@ -129,7 +156,9 @@ class HubCore:
         counters = Counter(self.counters)
         for net in self._nets.values():
             counters.update({f"radio_{cause}": count for cause, count in net.meter.rejected.items()})
-            counters["notices_dropped"] += net.outbox.dropped
+            counters["reports_unresolved"] += net.unresolved
+            counters["notices_dropped"] += net.correspondence.outbox.dropped
+            counters["notices_unacknowledged"] += net.correspondence.outbox.given_up
             counters["radio_counter_faults"] += net.counter_faults
             counters["radio_faults"] += net.faults
         states = Counter(known.state for known in self._tracks.all())
@@ -161,7 +190,9 @@ class HubCore:
         self._last_step = None
         self._clocks.clear()
         self._own.clear()
+        self._retelling.clear()
         self._tracks.set_back(by_ns)
+        self._watch.set_back(by_ns)
         for net in self._nets.values():
             net.set_back(by_ns)
 
@@ -173,12 +204,14 @@ class HubCore:
         return [output for each in range(first, step + 1) for output in self._step(each)]
 
     def _step(self, step: int) -> Iterable[Envelope]:
-        """Tracks age, nets speak, and once a second links report."""
+        """Tracks age, nets speak, once a second links report, and the watch tells what it sees in the picture."""
         step_ns = step * STEP_NS
         yield from [self._track(known) for known in self._tracks.changes(step_ns)]
         self._speak(step_ns)
         if step % STEPS_PER_S == 0:
             yield from self._each_second(step_ns)
+        for source, message in self._watch.step(step_ns, self._tracks):
+            yield self._publisher.message(source, message)
 
     # -- our own soldier --------------------------------------------------------------------------------------
 
@@ -187,8 +220,7 @@ class HubCore:
         return self._conditions.get(self._member.number, "ok")
 
     def _report_of(self, position: Position) -> Report:
-        east, north, _ = position.velocity_m_s
-        velocity = self._velocity.update(position.time_ns, east, north)
+        velocity = self._motion.update(position)
         return report_of_position(position, self._member.number, velocity, self._condition)
 
     def _place(self, fix: Fix) -> list[Envelope]:
@@ -211,6 +243,7 @@ class HubCore:
         if isinstance(notice, StatusNotice):
             self._conditions[notice.number] = notice.condition
         if self._is_new(notice):
+            self._note_target(message)
             for net in self._nets.values():
                 net.post(notice, self._now_ns)
         return []
@@ -218,12 +251,18 @@ class HubCore:
     # -- what was heard ---------------------------------------------------------------------------------------
 
     def _heard_reports(self, sender: int, reports: Sequence[Report], link: str) -> list[Envelope]:
+        if not reports:
+            return []
         clock = self._clocks.setdefault(sender, SenderClock())
         own = [report.time_ns for report in reports if report.number == sender and report.hops == 0]
         clock.observe(own, max(report.time_ns for report in reports), self._now_ns)
+        offset_ns = clock.offset_ns
         outputs: list[Envelope] = []
         for report in reports:
-            outputs += self._heard_report(replace(report, time_ns=report.time_ns + clock.offset_ns), link)
+            if offset_ns:
+                report = replace(report, time_ns=report.time_ns + offset_ns)
+            self._watch.contacts.proven(sender, report.number, report.time_ns)
+            outputs += self._heard_report(report, link)
         return outputs
 
     def _heard_report(self, report: Report, link: str) -> list[Envelope]:
@@ -233,10 +272,12 @@ class HubCore:
         self._nets[link].scheduler.told(report)
         if report.number == self._member.number:
             return []
+        before = self._tracks.get(report.number)
         known = self._tracks.update(report, self._now_ns, link)
         if known is None:
             self.counters["reports_not_newer"] += 1
             return []
+        self._watch.told(before, known)
         return [self._track(known), *self._condition_change(report)]
 
     def _condition_change(self, report: Report) -> Iterable[Envelope]:
@@ -275,8 +316,9 @@ class HubCore:
     def _speak(self, step_ns: int) -> None:
         candidates = self._candidates(step_ns)
         for name, net in self._nets.items():
+            self._retelling.see_to(name, net, step_ns)
             try:
-                frames = net.speak(candidates, step_ns)
+                frames = net.speak([*candidates, *self._retelling.others(name, step_ns)], step_ns)
             except Exception:
                 # A fault in one net's speech must not silence the others, nor lose the tracks of this step.
                 net.faults += 1
@@ -294,30 +336,35 @@ class HubCore:
                 own = self._own.at(step_ns, self._now_ns)
                 candidates += [] if own is None else [own]
             elif self._settings.relays and known.report.hops < MAX_HOPS:
-                candidates.append(one_hop_on(known.report))
+                candidates.append(known.passed_on)
         return candidates
 
     def _each_second(self, second_ns: int) -> Iterable[Envelope]:
         """Link reports, and a command post that still stands where it was put."""
         if self._placed is not None:
             yield from self._own_report(replace(self._placed, time_ns=second_ns))
+        fresh = sum(known.state == "fresh" for known in self._tracks.all())
         for name, net in self._nets.items():
-            yield self._envelope(name, net.report(second_ns))
+            net.correspondence.known = fresh
+            for listener, soldier, time_ns in net.scheduler.known_by_listeners():
+                self._watch.contacts.proven(listener, soldier, time_ns)
+            yield self._publisher.message(name, net.report(second_ns, self._ids))
 
     def _track(self, known: Known) -> Envelope:
-        member = self._roster[known.report.number]
-        return self._envelope(member.id, track_of(known, member))
+        return self._publisher.track(known, self._watch.held(known.via))
 
     def _notice(self, notice: Notice) -> Envelope:
-        soldier = self._roster[notice.number].id
-        return self._envelope(soldier, message_of(notice, soldier))
+        envelope = self._publisher.notice(notice)
+        self._note_target(envelope.message)
+        return envelope
 
-    def _envelope(self, source: str, message: Message) -> Envelope:
-        """A message under our own subtree, numbered per subject and source."""
-        address = self._identity.address(SUBJECT_OF[type(message)], source)
-        sequence = self._sequences[address]
-        self._sequences[address] += 1
-        return Envelope(address, msgspec.structs.replace(message, sequence=sequence))
+    def _note_target(self, message: Message) -> None:
+        """What somebody has seen may be shot at, and who is near it matters more to everybody."""
+        if not isinstance(message, Observation) or message.code in HARMLESS_CODES:
+            return
+        self._watch.lines.target(message, self._now_ns)
+        for net in self._nets.values():
+            net.scheduler.relevance.saw(self._now_ns, message.latitude_deg, message.longitude_deg)
 
 
 def _note(counters: Mapping[str, int]) -> str:

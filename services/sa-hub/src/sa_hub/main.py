@@ -1,4 +1,4 @@
-"""The sa-hub process: sockets, key and counter files around the hub's core."""
+"""The sa-hub process: links, key and counter files around the hub's core."""
 
 import math
 import time
@@ -14,15 +14,17 @@ from bootprint.figures import Figures
 from bootprint.messages import Track
 from bootprint.service import Context, Service
 from sa_hub.assembly import build_hub
-from sa_hub.hub import HubCore
-from sa_hub.keys import load_group_key
+from sa_hub.hub import STEP_NS, HubCore
+from sa_hub.keys import load_group_key, load_next_key
 from sa_hub.radio.counters import FileCounters
-from sa_hub.radio.links.udp import UdpLink
+from sa_hub.radio.links import Link
+from sa_hub.radio.links.opening import Surroundings, open_link
 from sa_hub.radio.replay import Memory
 from sa_hub.radio.replay_file import MemoryFile
-from sa_hub.settings import HubSettings, check_settings
+from sa_hub.settings import HubSettings, LinkProfile, check_settings
 
 _LATENCIES: Final = 512
+_STOOD_STILL_S: Final = 0.5  # host time; ticks come every 0.1 s
 
 
 class LatencyGauge:
@@ -54,7 +56,7 @@ def _is_sensed(track: Track) -> bool:
 
 
 class HubPart:
-    """A hub's core with its sockets; replay memory is kept before what a frame said is published."""
+    """A hub's core with its links; replay memory is kept before what a frame said is published."""
 
     def __init__(
         self, context: Context, core: HubCore, settings: HubSettings, memories: Mapping[str, MemoryFile]
@@ -64,7 +66,15 @@ class HubPart:
         self._latency = LatencyGauge(context.clock)
         self._memories = memories
         self._memory_faults = 0
-        self._links = {link.name: UdpLink(link, partial(self._arrived, link.name)) for link in settings.links}
+        self._ticked_ns: int | None = None
+        self._links = self._open(settings.links)
+
+    def _open(self, profiles: Iterable[LinkProfile]) -> dict[str, Link]:
+        computer = self._context.computer
+        around = Surroundings(
+            computer.realm.id, computer.member.number, computer.path.parent, self._context.clock.now_ns
+        )
+        return {each.name: open_link(each, partial(self._arrived, each.name), around) for each in profiles}
 
     def start(self) -> None:
         """Begin to receive."""
@@ -72,7 +82,7 @@ class HubPart:
             link.start()
 
     def _arrived(self, name: str, data: bytes) -> None:
-        """In the link's thread: hand the datagram to the main loop."""
+        """In the link's thread: hand the frame to the main loop."""
         self._context.post(lambda: self._receive(name, data))
 
     def _receive(self, name: str, data: bytes) -> list[Envelope]:
@@ -96,24 +106,43 @@ class HubPart:
 
     def tick(self, now_ns: int) -> list[Envelope]:
         """Event time goes on; what the nets have to say goes out."""
-        outputs = self._core.tick(now_ns)
+        outputs = self._made_up(now_ns)
+        for name, link in self._links.items():
+            self._core.hold(name, busy=link.busy)
+        outputs += self._core.tick(now_ns)
         for frame in self._core.take_frames():
             self._links[frame.link].send(frame.data)
         return outputs
 
+    def _made_up(self, now_ns: int) -> list[Envelope]:
+        """After standing still, what would have been said meanwhile is not said now, all at once."""
+        clock, last_ns = self._context.clock, self._ticked_ns
+        self._ticked_ns = now_ns
+        if last_ns is None or (clock.host_seconds_since(last_ns) or 0.0) < _STOOD_STILL_S:
+            return []
+        for name in self._links:
+            self._core.hold(name, busy=True)
+        return self._core.tick(max(last_ns, now_ns - STEP_NS))
+
     def figures(self) -> Figures:
-        """The core's figures, the sockets' faults and the latency."""
+        """The core's figures, the links' faults and the latency."""
         figures = self._core.figures()
         faults = {
             "send_faults": sum(link.send_faults for link in self._links.values()),
+            "link_garbled": sum(link.garbled for link in self._links.values()),
             "memory_faults": self._memory_faults,
         }
+        note = figures.note or "; ".join(link.fault for link in self._links.values() if link.fault)
         return replace(
-            figures, counters=figures.counters | faults, gauges=figures.gauges | self._latency.gauges()
+            figures,
+            state="degraded" if note else figures.state,
+            counters=figures.counters | faults,
+            gauges=figures.gauges | self._latency.gauges(),
+            note=note,
         )
 
     def close(self) -> Iterable[Envelope]:
-        """Close the sockets; what was heard is complete then."""
+        """Close the links; what was heard is complete then."""
         for name, link in self._links.items():
             link.close()
             self._keep(name, self._memories[name].close)
@@ -121,11 +150,11 @@ class HubPart:
 
 
 def build(context: Context) -> HubPart:
-    """Read key, counters and replay memory, and bind the sockets; ConfigError if anything is not there or wrong."""
+    """Read key, counters and replay memory, and open the links; ConfigError if anything is not there or wrong."""
     computer = context.computer
     settings = computer.section("hub", HubSettings)
     check_settings(settings, f"{computer.path}: [hub]")
-    key = load_group_key(computer.keys_dir / f"{settings.group_key or computer.realm.group_key}.key")
+    key_file = computer.keys_dir / f"{settings.group_key or computer.realm.group_key}.key"
     radio_dir = computer.state_dir / "radio"
     files = {link.name: MemoryFile(radio_dir / f"{link.name}.heard") for link in settings.links}
 
@@ -138,14 +167,22 @@ def build(context: Context) -> HubPart:
             context.log.warning("replay memory is damaged, starting afresh", net=net)
         return loaded
 
-    core = build_hub(computer.realm, computer.member, settings, key, counters, memories=memory)
+    core = build_hub(
+        computer.realm,
+        computer.member,
+        settings,
+        load_group_key(key_file),
+        counters,
+        memories=memory,
+        next_key=load_next_key(key_file),
+    )
     return HubPart(context, core, settings, files)
 
 
 SERVICE = Service(
     name="sa-hub",
     summary="Keep the squad's picture: tracks, alerts and the radio that carries them.",
-    subjects=("position", "fix", "alert", "observation", "status"),
+    subjects=("position", "fix", "alert", "observation", "status", "aim"),
     build=build,
 )
 

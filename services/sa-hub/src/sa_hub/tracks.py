@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from bootprint.clock import NS_PER_S
+from bootprint.display import Ages
 from bootprint.messages import TrackState
-from sa_hub.radio.content import Report
+from sa_hub.radio.content import Report, one_hop_on
 
 CLOCK_TOLERANCE_NS: Final = 10 * NS_PER_S
 """A sender's clock that seems off by less is taken as right: the way of a frame takes time, too."""
@@ -18,7 +19,7 @@ _CLOCK_SAMPLES: Final = 8
 _CLOCK_SET_SAMPLES: Final = 3
 _RELAYED_ONLY: Final = 64
 """Frames without the sender's own report after which its old ones tell nothing of its clock any more."""
-_SMOOTHING_S: Final = 1.5
+_SMOOTHING_S: Final = 0.5
 
 
 @dataclass(slots=True)
@@ -29,20 +30,14 @@ class Known:
     received_ns: int
     via: str
     state: TrackState = "fresh"
+    _passed_on: Report | None = None
 
-
-@dataclass(frozen=True, slots=True)
-class Ages:
-    """From which age a track is stale, and lost."""
-
-    stale_ns: int
-    lost_ns: int
-
-    def state(self, age_ns: int) -> TrackState:
-        """The state of a track of this age."""
-        if age_ns >= self.lost_ns:
-            return "lost"
-        return "stale" if age_ns >= self.stale_ns else "fresh"
+    @property
+    def passed_on(self) -> Report:
+        """The report as a relay sends it on; made once, since relays ask for everybody's ten times a second."""
+        if self._passed_on is None:
+            self._passed_on = one_hop_on(self.report)
+        return self._passed_on
 
 
 class Tracks:
@@ -91,6 +86,7 @@ class Tracks:
         for known in self._known.values():
             known.report = replace(known.report, time_ns=known.report.time_ns - by_ns)
             known.received_ns -= by_ns
+            known._passed_on = None
 
     def _supersedes(self, report: Report, known: Report) -> bool:
         set_back = report.number == self._own and known.time_ns - report.time_ns > CLOCK_SET_BACK_NS
@@ -145,7 +141,7 @@ def _append(differences_ns: deque[int], difference_ns: int) -> None:
 
 
 class SmoothVelocity:
-    """First-order low-pass (1.5 s) of velocity: a report's velocity must outlast the sway of a stride."""
+    """First-order low-pass (0.5 s) of velocity: a report's velocity must outlast the sway of a stride."""
 
     def __init__(self) -> None:
         self._velocity = (0.0, 0.0)

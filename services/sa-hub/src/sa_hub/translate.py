@@ -3,6 +3,7 @@
 import math
 
 from bootprint.config import Member
+from bootprint.display import Held
 from bootprint.geodesy import major_axis_sigma_m
 from bootprint.messages import Alert, Fix, Message, Observation, Position, Status, Track
 from sa_hub.radio.content import (
@@ -50,11 +51,15 @@ def report_of_fix(fix: Fix, number: int, condition: Condition) -> Report:
     )
 
 
-def track_of(known: Known, member: Member) -> Track:
-    """What the bus is told of a soldier; the rounding to a lattice cell counts into the accuracy."""
+def track_of(known: Known, member: Member, held: Held | None, sequence: int) -> Track:
+    """What the bus is told of a soldier; the rounding to a lattice cell counts into the accuracy.
+
+    ``held``: how well the net that it came over keeps the picture right, if that is known.
+    """
     report = known.report
     return Track(
         time_ns=report.time_ns,
+        sequence=sequence,
         soldier=member.id,
         number=member.number,
         state=known.state,
@@ -70,6 +75,8 @@ def track_of(known: Known, member: Member) -> Track:
         received_ns=known.received_ns,
         via=known.via,
         hops=report.hops,
+        held_m=None if held is None else held.sigma_m,
+        held_s=None if held is None else held.silence_s,
     )
 
 
@@ -86,6 +93,7 @@ def notice_of(message: Alert | Observation | Status, number: int) -> Notice:
                 longitude_deg=message.longitude_deg,
                 accuracy_m=message.accuracy_m,
                 text=message.text,
+                code=message.code,
             )
         case Status():
             return StatusNotice(number, message.time_ns, message.condition, message.battery_pct)
@@ -104,6 +112,7 @@ def message_of(notice: Notice, soldier: str) -> Message:
                 longitude_deg=notice.longitude_deg,
                 accuracy_m=notice.accuracy_m,
                 text=notice.text,
+                code=notice.code,
             )
         case StatusNotice():
             return Status(

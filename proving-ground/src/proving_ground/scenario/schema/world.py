@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from bootprint.config import Config
+from bootprint.errors import ConfigError
 from proving_ground.scenario.schema.units import (
     Length,
     Outline,
@@ -14,6 +15,7 @@ from proving_ground.scenario.schema.units import (
     Share,
     outline_of,
 )
+from sa_hub.radio.profiles import named
 
 Vector = tuple[float, float, float]
 
@@ -144,10 +146,21 @@ class Net(Config, kw_only=True, frozen=True):
             description="one net for each such unit: all of a squad; above, its own posts and the leaders below"
         ),
     ] = None
-    rate_bits_per_s: Annotated[float, Meta(ge=100, le=1e9)] = 9600.0
-    latency_s: Annotated[float, Meta(ge=0, le=60)] = 0.05
+    profile: Annotated[
+        str | None,
+        Meta(description="a named radio (`bootprint radio profiles`) whose figures hold (default: `udp`)"),
+    ] = None
+    rate_bits_per_s: Annotated[
+        Annotated[float, Meta(ge=75, le=1e9)] | None, Meta(description="(default: the radio's)")
+    ] = None
+    latency_s: Annotated[
+        Annotated[float, Meta(ge=0, le=60)] | None, Meta(description="(default: the radio's)")
+    ] = None
     loss: Annotated[float, Meta(ge=0, le=0.9, description="share of frames that each receiver misses")] = 0.0
-    header_bytes: Annotated[int, Meta(ge=0, le=200, description="that the link adds to every frame")] = 28
+    header_bytes: Annotated[
+        Annotated[int, Meta(ge=0, le=200)] | None,
+        Meta(description="that the link adds to every frame (default: the radio's)"),
+    ] = None
     outages: Annotated[tuple[Span, ...], Meta(description="when the net is down")] = ()
 
     def __post_init__(self) -> None:
@@ -155,6 +168,11 @@ class Net(Config, kw_only=True, frozen=True):
             raise ValueError('a net needs either members or each = "squad", "platoon" or "company"')
         if self.members and not self.name:
             raise ValueError("a net with members needs a name")
+        if self.profile is not None:
+            try:
+                named(self.profile)
+            except ConfigError as error:
+                raise ValueError(str(error)) from error
 
 
 class FaultTable(Config, kw_only=True, frozen=True, tag_field="kind"):

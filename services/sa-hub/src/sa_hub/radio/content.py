@@ -3,12 +3,15 @@
 from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeVar, get_args
 
-from bootprint.messages import Mode
+from bootprint.messages import Mode, ObservationCode
+from sa_hub.radio.control import Acknowledgement, Fragment, Request
 
 AlertKind = Literal["contact", "casualty", "help", "fire", "withdraw", "other"]
 Condition = Literal["ok", "busy", "wounded", "out"]
 ALERT_KINDS: Final[tuple[AlertKind, ...]] = get_args(AlertKind)
 CONDITIONS: Final[tuple[Condition, ...]] = get_args(Condition)
+OBSERVATION_CODES: Final[tuple[ObservationCode, ...]] = get_args(ObservationCode)
+"""In the order of their numbers on the air, from 1; new ones are added at the end, at most 63 in all."""
 MAX_HOPS: Final = 3
 MAX_TEXT_CHARACTERS: Final = 200
 MAX_TEXT_BYTES: Final = 255
@@ -38,10 +41,72 @@ class Report:
 
 
 @dataclass(frozen=True, slots=True)
+class Feedback:
+    """Which frames of sender ``about`` were heard: the ``newest``, a counter or its low bits, and some before.
+
+    ``heard`` has a bit for each of the ``span`` counters before the newest, bit 0 for the one right before it.
+    """
+
+    about: int
+    newest: int
+    span: int
+    heard: int
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """What changes seldom about a soldier, as codes of the layout: accuracy, mode, hops, condition."""
+
+    accuracy: int
+    mode: int
+    hops: int
+    condition: int
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """Floor and height, whole metres (modulo 256 when read from a frame); None where unknown."""
+
+    floor: int | None
+    height_m: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One soldier in an update: row and column (told modulo), velocity codes or None, what has changed."""
+
+    number: int
+    row: int
+    column: int
+    velocity: tuple[int, int] | None
+    age_ticks: int = 0
+    quality: Quality | None = None
+    level: Level | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Update:
+    """Soldiers told against what receivers predict: rows and columns of ``resolution`` modulo 2^``reach_bits``.
+
+    Whoever missed no more than ``misses`` of the sender's frames since it last heard of a soldier can resolve that
+    entry. ``tick`` is the frame's time, modulo 256 when it is read from a frame.
+    """
+
+    tick: int
+    resolution: int
+    reach_bits: int
+    misses: int
+    entries: tuple[Entry, ...]
+    feedback: Feedback | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Reports:
-    """Reports of one or many soldiers in one frame."""
+    """Reports of one or many soldiers in one frame, of the time ``tick`` (the newest report's if None)."""
 
     reports: tuple[Report, ...]
+    feedback: Feedback | None = None
+    tick: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +122,7 @@ class AlertNotice:
 
 @dataclass(frozen=True, slots=True)
 class ObservationNotice:
-    """A thing that soldier ``number`` saw, with its place."""
+    """A thing that soldier ``number`` saw, with its place; ``code`` None: the text tells what it is."""
 
     number: int
     time_ns: int
@@ -66,6 +131,7 @@ class ObservationNotice:
     accuracy_m: float
     text: str = ""
     hops: int = 0
+    code: ObservationCode | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +146,7 @@ class StatusNotice:
 
 
 Notice = AlertNotice | ObservationNotice | StatusNotice
-Content = Reports | Notice
+Content = Reports | Update | Notice | Acknowledgement | Request | Fragment
 Relayable = TypeVar("Relayable", bound=Report | AlertNotice | ObservationNotice | StatusNotice)
 
 

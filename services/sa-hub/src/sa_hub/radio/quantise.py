@@ -18,9 +18,11 @@ HEIGHT_MIN_M: Final = -1024
 HEIGHT_BITS: Final = 14
 FLOOR_MIN: Final = -32
 FLOOR_BITS: Final = 7
-DIRECTIONS: Final = 32
+DIRECTIONS: Final = 16
 SPEEDS_M_S: Final = tuple(0.3 * 1.28**code for code in range(16))
 STANDING_BELOW_M_S: Final = SPEEDS_M_S[0] / 2
+PACES: Final = (2, 4, 6, 8)
+"""The speeds of people on foot: codes of `SPEEDS_M_S`."""
 ACCURACIES_M: Final = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 50.0, 1000.0)
 AGE_CODES: Final = 256
 LONGEST_AGE_TICKS: Final = 63 << 6
@@ -124,7 +126,7 @@ def accuracy_code(accuracy_m: float) -> int:
 def velocity_codes(east_m_s: float, north_m_s: float) -> tuple[int, int] | None:
     """(direction, speed) codes, None when standing.
 
-    Direction is right to 5.6°, speed to a factor of √1.28 (13 %) between 0.27 and 13.8 m/s, held above.
+    Direction is right to 11.25°, speed to a factor of √1.28 (13 %) between 0.27 and 13.8 m/s, held above.
     """
     speed = math.hypot(east_m_s, north_m_s)
     if speed < STANDING_BELOW_M_S:

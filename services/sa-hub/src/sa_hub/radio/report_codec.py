@@ -12,10 +12,11 @@ from sa_hub.radio.layout import SELF, SOLDIER, SQUAD, read_fields, write_fields
 from sa_hub.radio.squad import MAX_SOLDIERS, OFFSET_LIMIT, UP_LIMIT_M, Anchor, Offsets, anchor_of, offsets_of
 
 MAX_NUMBER: Final = 1023
-_NEAR_BITS: Final = 16
+_NEAR_BITS: Final = 15
 _NEAR_HEIGHT_BITS: Final = 8
 
 Values = Mapping[str, int]
+Decoded = tuple[bool, int, tuple[Report, ...]]
 
 
 class ReportCodec:
@@ -25,36 +26,34 @@ class ReportCodec:
         self._origin = origin
         self._exercise = exercise
 
-    def encode_self(self, report: Report, resolution: int) -> bytes:
+    def write_self(self, writer: BitWriter, report: Report, resolution: int) -> None:
         """A soldier's report of itself: no number, no age, no hops."""
-        writer = BitWriter()
         place = self._place_values(anchor_of([report], resolution))
         write_fields(writer, SELF, place | _soldier_values(report))
-        return writer.to_bytes()
 
-    def encode_squad(self, reports: Sequence[Report], resolution: int) -> bytes:
+    def write_squad(
+        self, writer: BitWriter, reports: Sequence[Report], resolution: int, tick: int | None = None
+    ) -> None:
         """Reports of up to 64 soldiers, sorted by number; ValueError if they span more than a frame can say."""
         ordered = sorted(reports, key=lambda report: report.number)
-        anchor = anchor_of(ordered, resolution)
+        anchor = anchor_of(ordered, resolution, tick)
         offsets = [offsets_of(report, anchor) for report in ordered]
         frame = self._place_values(anchor) | _squad_values(offsets)
-        writer = BitWriter()
         write_fields(writer, SQUAD, frame)
         for previous, report, offset in zip([None, *ordered], ordered, offsets, strict=False):
             values = _soldier_values(report) | _relative_values(report, previous, offset, anchor)
             write_fields(writer, SOLDIER, frame | values)
-        return writer.to_bytes()
 
-    def decode_self(self, reader: BitReader, sender: int, now_tick: int) -> tuple[bool, tuple[Report, ...]]:
-        """Whether it is exercise, and the sender's report."""
+    def decode_self(self, reader: BitReader, sender: int, now_tick: int) -> Decoded:
+        """Whether it is exercise, the frame's time, and the sender's report."""
         values = read_fields(reader, SELF, {})
         anchor = self._anchor(values, now_tick)
         offsets = Offsets(0, 0, None if anchor.height is None else 0)
         relative = {"number": sender, "hops": 0}
-        return bool(values["exercise"]), (_report(anchor, offsets, values | relative),)
+        return bool(values["exercise"]), anchor.tick, (_report(anchor, offsets, values | relative),)
 
-    def decode_squad(self, reader: BitReader, sender: int, now_tick: int) -> tuple[bool, tuple[Report, ...]]:
-        """Whether it is exercise, and the reports, whoever sent them."""
+    def decode_squad(self, reader: BitReader, sender: int, now_tick: int) -> Decoded:
+        """Whether it is exercise, the frame's time, and the reports, whoever sent them."""
         frame = read_fields(reader, SQUAD, {})
         anchor = self._anchor(frame, now_tick)
         reports: list[Report] = []
@@ -63,7 +62,7 @@ class ReportCodec:
             values = _carried_over(read_fields(reader, SOLDIER, frame), values)
             up = values["up"] if values.get("height_known") else None
             reports.append(_report(anchor, Offsets(values["east"], values["north"], up), values))
-        return bool(frame["exercise"]), tuple(reports)
+        return bool(frame["exercise"]), anchor.tick, tuple(reports)
 
     def _place_values(self, anchor: Anchor) -> dict[str, int]:
         height = anchor.height or 0

@@ -1,111 +1,350 @@
-"""When to report whom: what the receivers on a net believe, and how wrong that belief has become.
+"""When to tell whom, and how: the error that receivers are believed to have, bought down at the price of bits.
 
-Every receiver moves a soldier on at constant velocity from the last report on the air, whoever sent it. A report
-is worth sending when that prediction is off by more than a threshold, or when a heartbeat is due; since what was
-heard on a net is believed there, a relay never repeats a net's own news to it.
-
-Nobody acknowledges a report, so news is confirmed: after a report that changed the belief the next heartbeat comes
-early, then later and later (doubling, as the Trickle algorithm of RFC 6206), until something changes again.
+Every receiver moves a soldier on from the last report on the air, by the rule of `bootprint.prediction`. The
+scheduler keeps what receivers have (`listeners`), so it knows how far off they show everyone; what telling would be
+worth is weighed against bits (`offers`), whose price follows the budget (`pacing`). What was heard on a net is
+known there, so a relay never repeats a net's own news to it.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from bootprint.clock import NS_PER_S
-from bootprint.geodesy import ground_offset
-from sa_hub.radio.content import Report
+from sa_hub.radio import quantise as q
+from sa_hub.radio.content import Report, Reports, Update
+from sa_hub.radio.grid import Grid
+from sa_hub.radio.ground import FloatArray
+from sa_hub.radio.history import History
+from sa_hub.radio.layout import MISSES
+from sa_hub.radio.listeners import LOSSLESS, Listeners
+from sa_hub.radio.offers import LEAST_ENTRY_BITS, MOTION_BITS, RESOLUTIONS, Terms, Wares, best_offer
+from sa_hub.radio.pacing import Pacing
+from sa_hub.radio.persistence import LONGEST_S, Persistence
+from sa_hub.radio.picture import Spoken
+from sa_hub.radio.references import resolved
+from sa_hub.radio.relevance import Relevance
+from sa_hub.radio.telling import FRESH_NS, Telling
+from sa_hub.radio.wares import Candidates, candidates_of, samples_of, worth
 
-COMPANION_URGENCY: Final = 0.6
-"""Who is this near to being due comes along in a frame that is sent anyway."""
-
-CLOCK_SET_BACK_S: Final = 60.0
-"""A belief about ourselves that is this much newer than what we know now is of a clock since set right."""
+ENOUGH: Final = 0.12
+"""Of the threshold: an error below it is worth no bits."""
+COARSE_CELL: Final = 0.5
+"""Of the threshold: cells are no larger."""
+CHEAP: Final = (math.exp(-4.0), math.exp(-5.0))
+"""Prices of a bit below which cells are a half, and a quarter, of that."""
+CLOCK_SET_BACK_NS: Final = 60 * NS_PER_S
+STANDING_M_S: Final = 0.3
+_CHANGE_WORTH: Final = 3.0
+_AGE_BITS: Final = 8.0
+_REFRESH_WORTH: Final = 5.0
+_REFRESH_S: Final = 12.0
+_REFRESH_LIMITS_S: Final = (60.0, 600.0)
+_FIRST_REFRESH_S: Final = (5.0, 1.0)
+_OVERDUE_S: Final = 20.0
+_REFRESH_AGE_NS: Final = 10 * NS_PER_S
+_CHEAP_REFRESH_S: Final = 15.0
+_CHEAP_MISSES: Final = 3
+"""Where bits are cheap, what is told is proof against surprises: more may be missed, all goes in full often."""
+_URGED_WORTH: Final = 50.0
+_UNSURE: Final = 5e-4
+_ENTRY_BITS: Final = 18.0
+PERIOD_NS: Final = 200_000_000
+"""Time between decisions."""
+_LONGEST_ELAPSED_S: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Policy:
-    """Error and silence that make a report due, and how long the first one due waits for others.
+    """The error to stay below where the budget allows it, the longest wanted silence, and the loss assumed."""
 
-    ``confirm_s`` is the silence allowed after news, ``heartbeat_s`` the silence it grows to.
-    """
-
-    threshold_m: float
-    heartbeat_s: float
-    confirm_s: float
-    gather_s: float
+    threshold_m: float = 5.0
+    heartbeat_s: float = 30.0
+    loss: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class Belief:
-    """What a net knows of a soldier, and after which silence it is to hear again."""
+class Room:
+    """What the budget allows: bits free now, of how many at most, per second; and the longest payload that can go.
 
-    report: Report
-    silence_s: float
+    ``frame_bits``: the next frame's header and tag on the air; ``bits_per_bit``: what a payload's bit costs there.
+    """
+
+    free_bits: float
+    depth_bits: float
+    rate_bits_per_s: float
+    payload_bits: float
+    frame_bits: float
+    bits_per_bit: float = 1.0
+
+    def interval_s(self, soldiers: int) -> float:
+        """Time between two reports of a soldier, when so many share the budget."""
+        return (self.frame_bits + _ENTRY_BITS * self.bits_per_bit * soldiers) / self.rate_bits_per_s
 
 
 class Scheduler:
-    """The receivers' beliefs on one net."""
+    """What one net is told by this hub."""
 
-    def __init__(self, policy: Policy, own: int) -> None:
+    def __init__(self, policy: Policy, own: int, grid: Grid, relevance: Relevance | None = None) -> None:
+        self.relevance = relevance or Relevance()
+        self.listeners = Listeners(policy.loss, seed=own)
         self._policy = policy
         self._own = own
-        self._beliefs: dict[int, Belief] = {}
-        self._first_due_ns: int | None = None
+        self._grid = grid
+        self._history = History(grid)
+        self._pacing = Pacing()
+        self._persistence = Persistence()
+        self._slots: dict[int, int] = {}
+        self._heard_ns: dict[int, int] = {}
+        self._full_ns: dict[int, tuple[int, int]] = {}
+        self._base_ns: int | None = None
+        self._planned_ns: int | None = None
+        self._latest: Candidates | None = None
+
+    # -- what was on the air ----------------------------------------------------------------------------------
 
     def told(self, report: Report) -> None:
-        """This report was on the air: it is what the net believes now, unless it knows better."""
-        belief = self._beliefs.get(report.number)
-        if belief is None or report.time_ns > belief.report.time_ns or report.number == self._own:
-            self._beliefs[report.number] = Belief(report, self._silence_after(report, belief))
+        """Somebody else's report was on the air: the net has it, and we need not tell it."""
+        self._heard_ns[report.number] = max(report.time_ns, self._heard_ns.get(report.number, report.time_ns))
+        self.listeners.overheard(self._spoken([report], None, ours=False))
 
-    def _silence_after(self, report: Report, belief: Belief | None) -> float:
-        policy = self._policy
-        if (
-            belief is None
-            or predicted_error_m(belief.report, report) > COMPANION_URGENCY * policy.threshold_m
-        ):
-            return min(policy.confirm_s, policy.heartbeat_s)
-        return min(2.0 * belief.silence_s, policy.heartbeat_s)
+    def sent(self, counter: int, content: object, now_ns: int) -> None:
+        """Our frame with this counter was on the air; ``content`` as a receiver decodes it."""
+        reports, misses = self._meant(content, now_ns)
+        spoken = self._spoken(reports, misses, ours=True)
+        self.listeners.spoke(counter, spoken)
+        self._history.spoke(spoken, reports)
+        if misses is None:
+            for report in reports:
+                _, times = self._full_ns.get(report.number, (now_ns, -1))
+                self._full_ns[report.number] = now_ns, times + 1
+
+    def _meant(self, content: object, now_ns: int) -> tuple[tuple[Report, ...], int | None]:
+        """The reports of a frame as receivers have them, and what it allows to be missed."""
+        match content:
+            case Reports():
+                return content.reports, None
+            case Update():
+                tick = q.tick_of(now_ns)
+                told = self._history.told
+                pairs = [(told[self._slot(entry.number)], entry) for entry in content.entries]
+                meant = (resolved(self._grid, before, content, entry, tick) for before, entry in pairs)
+                return tuple(report for report in meant if report is not None), content.misses
+            case _:
+                return (), None
+
+    def forget(self, numbers: Iterable[int]) -> None:
+        """Take these as never told, so that they are reported anew and in full."""
+        for number in numbers:
+            self.listeners.forget(self._slot(number))
+            self._history.forget(self._slot(number))
 
     def set_back(self, by_ns: int) -> None:
-        """The clock was set back by so much. Of ourselves nobody knows the new time yet: that is news."""
-        self._first_due_ns = None
-        self._beliefs.pop(self._own, None)
-        for number, belief in self._beliefs.items():
-            report = replace(belief.report, time_ns=belief.report.time_ns - by_ns)
-            self._beliefs[number] = replace(belief, report=report)
+        """The clock was set back by so much: nobody knows the new time yet, so all is told anew and in full."""
+        self.begin_again()
+        self._heard_ns = {number: time_ns - by_ns for number, time_ns in self._heard_ns.items()}
+        self.relevance.set_back(by_ns)
+        self._planned_ns = None
+        self._latest = None
+        self._base_ns = None
 
-    def due(self, candidates: Sequence[Report], now_ns: int) -> list[Report]:
-        """Who is to be reported now, the most urgent first: those due and those nearly so; none while gathering."""
-        ranked = sorted(((self.urgency(each), each) for each in candidates), key=lambda pair: -pair[0])
-        if not ranked or ranked[0][0] < 1.0:
-            self._first_due_ns = None
-            return []
-        if self._first_due_ns is None:
-            self._first_due_ns = now_ns
-        if len(candidates) > 1 and now_ns - self._first_due_ns < self._policy.gather_s * NS_PER_S:
-            return []
-        return [report for urgency, report in ranked if urgency >= COMPANION_URGENCY]
+    def begin_again(self) -> None:
+        """Nothing that was told before counts: all is told anew and in full."""
+        self.listeners.clear()
+        self._history.clear()
+        self._full_ns.clear()
 
-    def urgency(self, report: Report) -> float:
-        """1 when due: the larger of error and silence, each over what is allowed; infinite if never told."""
-        belief = self._beliefs.get(report.number)
-        if belief is None:
-            return math.inf
-        silence_s = (report.time_ns - belief.report.time_ns) / NS_PER_S
-        if silence_s <= 0.0:
-            set_back = report.number == self._own and silence_s < -CLOCK_SET_BACK_S
-            return math.inf if set_back else 0.0
-        error_m = predicted_error_m(belief.report, report)
-        return max(error_m / self._policy.threshold_m, silence_s / belief.silence_s)
+    def _slot(self, number: int) -> int:
+        """Where a soldier's values stand in all arrays."""
+        slot = self._slots.get(number)
+        if slot is None:
+            slot = self._slots[number] = len(self._slots)
+            if slot % 16 == 0:
+                for part in (self.listeners, self._history, self._persistence):
+                    part.widen(slot + 16)
+        return slot
+
+    def _slots_of(self, reports: Sequence[Report]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+        return np.array([self._slot(each.number) for each in reports], dtype=np.int64)
+
+    def _spoken(self, reports: Sequence[Report], misses: int | None, *, ours: bool) -> Spoken:
+        if self._base_ns is None and reports:
+            self._base_ns = reports[0].time_ns
+        samples = samples_of(reports, self._base_ns or 0)
+        time_s, latitude, longitude, east, north = samples.T
+        slots = self._slots_of(reports)
+        return Spoken(slots, time_s, latitude, longitude, east, north, misses, ours)
+
+    # -- what to tell -----------------------------------------------------------------------------------------
+
+    def is_due(self, now_ns: int) -> bool:
+        """Whether it is time to decide again."""
+        return self._planned_ns is None or now_ns - self._planned_ns >= PERIOD_NS
+
+    def pass_time(self, room: Room, now_ns: int) -> None:
+        """It is decided now: the price of bits follows the budget."""
+        elapsed_s = _LONGEST_ELAPSED_S
+        if self._planned_ns is not None:
+            elapsed_s = min((now_ns - self._planned_ns) / NS_PER_S, _LONGEST_ELAPSED_S)
+        self._planned_ns = now_ns
+        self._pacing.passed(elapsed_s, room.free_bits / room.depth_bits)
+
+    def plan(
+        self, candidates: Sequence[Report], room: Room, now_ns: int, *, urged: bool = False
+    ) -> Reports | Update | None:
+        """The frame to send now, if one is worth it.
+
+        ``urged``: updates could not be resolved here; our own report is worth more, since it takes feedback along.
+        """
+        news = [each for each in candidates if self._is_news(each, now_ns)]
+        if not news:
+            self._latest = None
+            return None
+        telling = self._telling(news, room, now_ns)
+        value, terms = self._worth(telling), self._terms(room)
+        value += [urged * _URGED_WORTH * (number == self._own) for number in telling.who.numbers]
+        refresh = self._refresh(telling.who, now_ns)
+        if not _may_pay(value.mean(axis=0) + refresh, terms):
+            return None
+        offer = best_offer(self._wares(telling, value, refresh), terms)
+        if (
+            offer is None
+            or terms.price * offer.bits + terms.frame_price > self._pacing.price * room.free_bits
+        ):
+            return None
+        return telling.in_full(offer) if offer.misses is None else telling.update(offer, offer.misses)
+
+    def expected_errors_m(self) -> dict[int, float]:
+        """How far off receivers show each soldier, as last decided: the mean over them, infinite if unknown."""
+        who = self._latest
+        if who is None:
+            return {}
+        pictures = self.listeners.pictures
+        east, north = pictures.off_m(who.slots, who.latitude, who.longitude, who.now_s)
+        errors_m = np.where(pictures.known[:, who.slots], np.hypot(east, north), math.inf).mean(axis=0)
+        return dict(zip(who.numbers, errors_m.tolist(), strict=True))
+
+    def newest_ns(self) -> dict[int, int]:
+        """The time of the newest report that the net has of each soldier, ours or another's."""
+        newest = dict(self._heard_ns)
+        for number, slot in self._slots.items():
+            told = self._history.told.get(slot)
+            if told is not None:
+                newest[number] = max(told.time_ns, newest.get(number, told.time_ns))
+        return newest
+
+    def known_by_listeners(self) -> Iterator[tuple[int, int, int]]:
+        """(listener, soldier, time of the report) of what hubs that give feedback are sure to know."""
+        numbers = {slot: number for number, slot in self._slots.items()}
+        for listener, slot, time_s in self.listeners.certain():
+            yield listener, numbers[slot], (self._base_ns or 0) + round(time_s * NS_PER_S)
+
+    def _is_news(self, report: Report, now_ns: int) -> bool:
+        """What the net told itself is not to be told to it, nor an old report of ourselves.
+
+        By what a frame says of its sender receivers judge the sender's clock, so that must be of its moment.
+        """
+        if report.number == self._own and now_ns - report.time_ns > FRESH_NS:
+            return False
+        heard_ns = self._heard_ns.get(report.number)
+        if heard_ns is None or report.time_ns > heard_ns:
+            return True
+        if report.number != self._own or heard_ns - report.time_ns <= CLOCK_SET_BACK_NS:
+            return False
+        # What was said of ourselves and is much newer than what we know now is of a clock since set right.
+        del self._heard_ns[report.number]
+        self.forget([report.number])
+        return True
+
+    def _telling(self, reports: Sequence[Report], room: Room, now_ns: int) -> Telling:
+        """Where these are now, and what velocity is worth telling of them."""
+        if self._base_ns is None:
+            self._base_ns = now_ns
+        slots, samples = self._slots_of(reports), samples_of(reports, self._base_ns)
+        self._persistence.see(slots, samples, min(room.interval_s(len(reports)), LONGEST_S))
+        shares = self._persistence.shares(slots)
+        who = candidates_of(reports, slots, samples, shares, (now_ns - self._base_ns) / NS_PER_S)
+        self._latest = who
+        velocity = who.velocity * shares[:, None]
+        velocity = np.where(np.hypot(*velocity.T)[:, None] < STANDING_M_S, 0.0, velocity)
+        return Telling(who, velocity, self._resolution(), now_ns, self._history, self._grid)
+
+    def _resolution(self) -> int:
+        """Finer cells when bits are cheap."""
+        coarse = q.resolution_for(COARSE_CELL * self._policy.threshold_m)
+        finer = sum(self._pacing.price < price for price in CHEAP)
+        return min(max(coarse - finer, RESOLUTIONS[0]), RESOLUTIONS[-1])
+
+    def _worth(self, telling: Telling) -> FloatArray:
+        """(rows, n) of telling each soldier to each receiver."""
+        policy, who = self._policy, telling.who
+        enough_m = ENOUGH * policy.threshold_m
+        value = worth(who, telling.velocity, self.listeners.pictures, enough_m, policy.heartbeat_s)
+        weights = self.relevance.weights(who.numbers, who.latitude, who.longitude, telling.now_ns)
+        weighted: FloatArray = weights * (value + _CHANGE_WORTH * telling.urgent())
+        return weighted
+
+    def _wares(self, telling: Telling, value: FloatArray, refresh: FloatArray) -> Wares:
+        who = telling.who
+        old = who.now_s - who.time_s > FRESH_NS / NS_PER_S
+        off_cells = self._history.cells_off(who.slots, *telling.aimed(), who.now_s)
+        return Wares(
+            worth=value,
+            behind=self.listeners.pictures.behind(who.slots),
+            bits=1.0 + MOTION_BITS * telling.velocity.any(axis=1) + _AGE_BITS * old,
+            changes_bits=telling.changes_bits(),
+            off_cells=np.where(telling.out_of_reach()[:, None], np.inf, off_cells),
+            refresh=refresh,
+            span_cells=who.span_m() / q.cell_m(telling.resolution),
+            resolution=telling.resolution,
+        )
+
+    def _refresh(self, who: Candidates, now_ns: int) -> FloatArray:
+        """(n,) what it is worth to tell in full again, for whoever can resolve nothing of a soldier.
+
+        The first times soon, since a first frame may be missed, then after ever longer pauses.
+        """
+        loss, cheap = self.listeners.loss, self._pacing.price < CHEAP[0]
+        if self.listeners.tell and not cheap:
+            return np.zeros(len(who.reports))
+        low, high = _REFRESH_LIMITS_S
+        longest_s = _CHEAP_REFRESH_S if cheap else min(max(_REFRESH_S / max(loss, LOSSLESS), low), high)
+        first_s = _FIRST_REFRESH_S[cheap]
+        overdue = [
+            self._overdue(number, now_ns, first_s, longest_s) * (now_ns - report.time_ns < _REFRESH_AGE_NS)
+            for number, report in zip(who.numbers, who.reports, strict=True)
+        ]
+        return _REFRESH_WORTH * np.array(overdue, dtype=np.float64)
+
+    def _overdue(self, number: int, now_ns: int, first_s: float, longest_s: float) -> float:
+        """How urgently a soldier that was told in full some times is to be so again: 0 within its pause, then 1,
+        and within the next minutes ever more, so that no price keeps a receiver in the dark for long."""
+        last_ns, times = self._full_ns.get(number, (now_ns, 0))
+        late_s = (now_ns - last_ns) / NS_PER_S - min(first_s * 2.0 ** min(times, 16), longest_s)
+        return 1.0 + (late_s / _OVERDUE_S) ** 2 if late_s > 0.0 else 0.0
+
+    def _terms(self, room: Room) -> Terms:
+        loss = self.listeners.loss
+        certain = 0 if self.listeners.tell else _least_misses(loss)
+        return Terms(
+            price=self._pacing.price * room.bits_per_bit,
+            frame_price=self._pacing.price * room.frame_bits,
+            room_bits=room.payload_bits,
+            delivered=1.0 if loss < LOSSLESS else 1.0 - loss,
+            least_misses=max(certain, _CHEAP_MISSES) if self._pacing.price < CHEAP[0] else certain,
+        )
 
 
-def predicted_error_m(belief: Report, report: Report) -> float:
-    """How far off a receiver that believes ``belief`` puts the soldier at the time of ``report``, horizontally."""
-    elapsed_s = (report.time_ns - belief.time_ns) / NS_PER_S
-    east, north = ground_offset(
-        (belief.latitude_deg, belief.longitude_deg), (report.latitude_deg, report.longitude_deg)
-    )
-    return math.hypot(east - belief.east_m_s * elapsed_s, north - belief.north_m_s * elapsed_s)
+def _may_pay(gain: FloatArray, terms: Terms) -> bool:
+    """Whether any frame could: a quick look, since most of the time none does."""
+    return float(np.maximum(gain - terms.price * LEAST_ENTRY_BITS, 0.0).sum()) > terms.frame_price
+
+
+def _least_misses(loss: float) -> int:
+    """What an update must allow for so that hardly anyone is left behind by chance."""
+    if loss < LOSSLESS:
+        return 0
+    return next((misses for misses in MISSES if loss ** (misses + 1) < _UNSURE), MISSES[-1])

@@ -34,15 +34,15 @@ class Offsets:
     up: int | None
 
 
-def anchor_of(reports: Sequence[Report], resolution: int) -> Anchor:
-    """The anchor of these reports; across the antimeridian columns count from the first report's."""
+def anchor_of(reports: Sequence[Report], resolution: int, tick: int | None = None) -> Anchor:
+    """The anchor of these reports at a ``tick``, the newest's if None; columns count from the first report's."""
     rows = [q.latitude_index(report.latitude_deg, resolution) for report in reports]
     columns = [q.longitude_index(report.longitude_deg, resolution) for report in reports]
     bits = q.LONGITUDE_BITS - resolution
     west = min(q.wrap(column - columns[0], bits) for column in columns)
     heights = [q.height_index(report.height_m) for report in reports if report.height_m is not None]
     return Anchor(
-        tick=max(q.tick_of(report.time_ns) for report in reports),
+        tick=max(q.tick_of(report.time_ns) for report in reports) if tick is None else tick,
         resolution=resolution,
         row=min(rows),
         column=q.wrap(columns[0] + west, bits),

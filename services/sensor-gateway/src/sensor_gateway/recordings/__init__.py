@@ -13,9 +13,12 @@ import structlog
 from bootprint.errors import RecordingError
 from sensor_gateway.recordings import (
     bus_recording,
+    chest_xsens,
     dualfoot_fgo,
     foot_gcp,
     gaitmap_example,
+    msindoor20,
+    phyphox,
     pyshoe_vicon,
     run_folder,
     xio_gait,
@@ -42,6 +45,7 @@ FOLDERS: tuple[Format, ...] = (
     Format("run folder", run_folder.recognises_folder, run_folder.read_folder),
     Format("dualfoot-fgo", dualfoot_fgo.recognises_folder, dualfoot_fgo.read_folder),
     Format("gaitmap-example", gaitmap_example.recognises_folder, gaitmap_example.read_folder),
+    Format("phyphox", phyphox.recognises_folder, phyphox.read_folder),
 )
 FILES: tuple[Format, ...] = (
     Format("bus recording", bus_recording.recognises, bus_recording.read),
@@ -53,6 +57,9 @@ FILES: tuple[Format, ...] = (
     Format("xio-gait", xio_gait.recognises, xio_gait.read),
     Format("gaitmap walk", gaitmap_example.recognises, gaitmap_example.read),
     Format("gaitmap motion capture", gaitmap_example.recognises_mocap, _no_runs),
+    Format("msindoor20", msindoor20.recognises, msindoor20.read),
+    Format("msindoor20 notes", msindoor20.recognises_notes, _no_runs),
+    Format("chest-xsens", chest_xsens.recognises, chest_xsens.read),
     Format("dualfoot-fgo part", dualfoot_fgo.recognises_part, _no_runs),
 )
 

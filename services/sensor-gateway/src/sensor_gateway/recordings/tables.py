@@ -200,6 +200,18 @@ def imu_series(
     return ImuSeries(time_s[usable], accel_m_s2[usable], gyro_rad_s[usable], mag)
 
 
+def resampled(time_s: FloatArray, series: FloatArray) -> FloatArray:
+    """The values of ``series`` (k, 1 + m), rows of (s, values), linearly at other times (n,): (n, m)."""
+    usable = series[np.isfinite(series).all(axis=1)]
+    rising = usable[advancing(usable[:, 0])]
+    return np.column_stack([np.interp(time_s, rising[:, 0], column) for column in rising[:, 1:].T])
+
+
+def phone_ahead(vectors: FloatArray) -> FloatArray:
+    """Vectors (n, 3) from a phone's axes (x right, y top, z screen) to forward, left, up: held flat, top ahead."""
+    return np.column_stack([vectors[:, 1], -vectors[:, 0], vectors[:, 2]])
+
+
 def advancing(time_s: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Which stamps are later than all before them, (n,)."""
     if not len(time_s):

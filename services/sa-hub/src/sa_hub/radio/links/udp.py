@@ -1,20 +1,26 @@
 """Frames as UDP datagrams: to any number of peers, unicast, broadcast or multicast; one thread receives."""
 
 import contextlib
+import errno
 import ipaddress
 import selectors
 import socket
 import struct
 import threading
+import time
 from collections.abc import Callable
 from typing import Final
 
 import structlog
 
 from bootprint.errors import ConfigError
-from sa_hub.settings import LinkProfile
+from sa_hub.radio.link_profile import LinkProfile
 
 _LONGEST_DATAGRAM: Final = 65_535
+_ANY_PORT: Final = "0.0.0.0:0"
+_ANY_HOST: Final = "0.0.0.0"
+_RETRY_S: Final = 1.0
+_DOWN: Final = {errno.ENETDOWN, errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENODEV, errno.EADDRNOTAVAIL}
 
 Address = tuple[str, int]
 
@@ -22,14 +28,21 @@ Address = tuple[str, int]
 class UdpLink:
     """One socket, bound when made; ConfigError if the profile's addresses cannot be used.
 
-    ``on_datagram`` is called in the receiving thread. ``send_faults`` counts datagrams the system refused.
+    ``on_datagram`` is called in the receiving thread. ``send_faults`` counts datagrams the system refused. While
+    none of the peers can be reached (no interface, no route), one frame in a second tries again, and groups are
+    joined anew.
     """
 
     def __init__(self, profile: LinkProfile, on_datagram: Callable[[bytes], None]) -> None:
         self.name = profile.name
         self.send_faults = 0
+        self.garbled = 0  # what a socket gives is a datagram
+        self.fault = ""
+        self._retry_at_s = 0.0
         self._on_datagram = on_datagram
         self._peers = [_parse(peer, profile.name) for peer in profile.peers]
+        self._groups = _groups(profile)
+        self._interface = profile.interface or _ANY_HOST
         self._socket = _open(profile)
         self._wake, self._woken = socket.socketpair()
         self._thread = threading.Thread(target=self._run, name=f"link {profile.name}", daemon=True)
@@ -44,13 +57,36 @@ class UdpLink:
         """Begin to receive."""
         self._thread.start()
 
+    @property
+    def busy(self) -> bool:
+        """Whether the network was not there a moment ago."""
+        return bool(self.fault) and time.monotonic() < self._retry_at_s
+
     def send(self, data: bytes) -> None:
         """Send one datagram to every peer, without waiting; what the system refuses is lost, as on the air."""
+        was_down, refused = bool(self.fault), 0
         for peer in self._peers:
             try:
                 self._socket.sendto(data, peer)
-            except OSError:
-                self.send_faults += 1
+            except OSError as error:
+                refused += 1
+                self._note_down(error)
+        self.send_faults += refused
+        if refused < len(self._peers):
+            self.fault = ""
+        if was_down and not self.fault:
+            self._join_again()
+
+    def _note_down(self, error: OSError) -> None:
+        if error.errno in _DOWN:
+            self.fault = f"{self.name}: {error.strerror}"
+            self._retry_at_s = time.monotonic() + _RETRY_S
+
+    def _join_again(self) -> None:
+        """The network is back: an interface that was made anew knows nothing of our groups."""
+        for group in self._groups:
+            with contextlib.suppress(OSError):  # joined still
+                _join(self._socket, group, self._interface)
 
     def close(self) -> None:
         """Stop receiving and free the socket."""
@@ -80,26 +116,32 @@ class UdpLink:
 
 
 def _open(profile: LinkProfile) -> socket.socket:
-    bind = _parse(profile.bind, profile.name)
+    bind = _parse(profile.bind or _ANY_PORT, profile.name)
+    interface = profile.interface or _ANY_HOST
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         opened.setblocking(False)
         opened.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        groups = [
-            host for host, _ in (bind, *(_parse(p, profile.name) for p in profile.peers)) if _multicast(host)
-        ]
+        groups = _groups(profile)
         if groups:
             opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            _use_interface(opened, profile.interface)
+            _use_interface(opened, interface)
         opened.bind(bind)
-        for group in dict.fromkeys(groups):
-            _join(opened, group, profile.interface)
+        for group in groups:
+            _join(opened, group, interface)
     except OSError as error:
         opened.close()
         raise ConfigError(
-            f"link {profile.name!r}: cannot use {profile.bind} on interface {profile.interface}: {error}"
+            f"link {profile.name!r}: cannot use {bind[0]}:{bind[1]} on interface {interface}: {error}"
         ) from error
     return opened
+
+
+def _groups(profile: LinkProfile) -> list[str]:
+    """The multicast groups among the profile's addresses."""
+    addresses = (profile.bind or _ANY_PORT, *profile.peers)
+    hosts = (_parse(address, profile.name)[0] for address in addresses)
+    return [host for host in dict.fromkeys(hosts) if _multicast(host)]
 
 
 def _use_interface(opened: socket.socket, interface: str) -> None:

@@ -1,0 +1,1 @@
+"""Height from air pressure and steps: climbs and floors."""

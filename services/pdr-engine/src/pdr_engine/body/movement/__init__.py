@@ -1,0 +1,1 @@
+"""How a person moves: class and direction of each step."""

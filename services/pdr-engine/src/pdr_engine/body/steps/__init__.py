@@ -1,0 +1,1 @@
+"""From raw samples to steps: what is usable, level, regular, and a step."""

@@ -1,0 +1,1 @@
+"""Steps as a track: the way back, satellites, and how far it can be relied on."""

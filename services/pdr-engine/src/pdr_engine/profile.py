@@ -1,0 +1,89 @@
+"""What is known of the person who wears the body unit, kept on disk from one start to the next.
+
+A profile that cannot be read is told and left aside: the person is learned anew.
+"""
+
+import os
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+
+from bootprint.bus import Envelope
+from bootprint.config import Config
+from bootprint.figures import Figures
+from bootprint.service import CorePart
+from pdr_engine.body import BodySettings
+from pdr_engine.engine import EngineCore
+
+FILE = "body-profile.json"
+SAVE_EVERY_NS = 60_000_000_000
+_LEAST_SIGMA = 0.02  # shoes, load and place of the unit are not those of last time
+
+
+class BodyProfile(Config, frozen=True):
+    """The person's factor on step length and the sigma of its logarithm."""
+
+    scale: Annotated[float, msgspec.Meta(ge=0.5, le=2.0)]
+    scale_sigma: Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
+
+
+def load_profile(path: Path) -> BodyProfile | None:
+    """The profile in a file, None if there is none; ValueError or OSError if it cannot be read."""
+    return msgspec.json.decode(path.read_bytes(), type=BodyProfile) if path.exists() else None
+
+
+def save_profile(path: Path, profile: BodyProfile) -> None:
+    """Write a profile so that a power cut leaves the old one or the new one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = path.with_suffix(".new")
+    with fresh.open("wb") as file:
+        file.write(msgspec.json.encode(profile))
+        file.flush()
+        os.fsync(file.fileno())
+    fresh.replace(path)
+
+
+def with_profile(settings: BodySettings, profile: BodyProfile) -> BodySettings:
+    """Settings that begin with what is known of the person."""
+    sigma = max(_LEAST_SIGMA, profile.scale_sigma)
+    length = msgspec.structs.replace(settings.length, scale=profile.scale, common_sigma_share=sigma)
+    return msgspec.structs.replace(settings, length=length)
+
+
+class EnginePart(CorePart):
+    """The engine's core with its person's profile saved every minute of event time and at the end."""
+
+    def __init__(self, core: EngineCore, path: Path) -> None:
+        super().__init__(core)
+        self._engine, self._path = core, path
+        self._saved_ns: int | None = None
+        self._unsaved = 0
+
+    def figures(self) -> Figures:
+        """The core's own, and how often the profile could not be saved."""
+        figures = super().figures()
+        return replace(figures, counters=figures.counters | {"profile_unsaved": self._unsaved})
+
+    def tick(self, now_ns: int) -> Iterable[Envelope]:
+        """Save when it is time."""
+        if self._saved_ns is None or now_ns - self._saved_ns >= SAVE_EVERY_NS:
+            self._saved_ns = now_ns
+            self._save()
+        return super().tick(now_ns)
+
+    def close(self) -> Iterable[Envelope]:
+        """Save, and let the core say its last words."""
+        self._save()
+        return super().close()
+
+    def _save(self) -> None:
+        found = self._engine.personal_scale
+        if found is None:
+            return
+        try:
+            save_profile(self._path, BodyProfile(scale=found[0], scale_sigma=found[1]))
+        except OSError:
+            self._unsaved += 1  # a full disk costs the profile, not the soldier

@@ -1,0 +1,120 @@
+"""The body-worn unit on the bus: its batches through the navigator, its steps out as messages in event time."""
+
+import math
+from collections.abc import Iterable, Iterator
+
+from bootprint.bus import Envelope
+from bootprint.config import Origin
+from bootprint.geodesy import LocalFrame
+from bootprint.geomagnetism import earth_field
+from bootprint.messages import BodyStep, GnssFix, ImuBatch, Pressure
+from bootprint.topics import Address
+from pdr_engine.body import BodyNavigator, BodySettings, BodyStepEstimate
+from pdr_engine.rate import RateMeter
+
+
+class Trunk:
+    """The navigator of the body-worn unit with the books that messages need.
+
+    Steps are numbered from 0. With an ``origin`` azimuths are from true north, by the declination there when the
+    first sample comes; without one from magnetic north.
+    """
+
+    def __init__(self, settings: BodySettings, imu: Address, origin: Origin | None = None) -> None:
+        self._navigator = BodyNavigator(settings)
+        self._origin = origin
+        self._declination_rad: float | None = None
+        self._address = imu.with_subject("body_step")
+        self._frame: LocalFrame | None = None
+        self._steps = 0
+        self._rate = RateMeter()
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second, of the newest second."""
+        return self._rate.rate_hz
+
+    @property
+    def newest_ns(self) -> int | None:
+        """Time of the newest sample."""
+        return self._rate.newest_ns
+
+    def handle(self, batch: ImuBatch) -> Iterable[Envelope]:
+        """Take a batch in; steps that it makes known come out."""
+        times = batch.times
+        self._rate.count(int(times[-1]), len(times))
+        if self._declination_rad is None:
+            self._learn_earth_field(int(times[0]))
+        return self._publish(self._navigator.process(times, batch.accel, batch.gyro, batch.mag))
+
+    def hear_pressure(self, pressure: Pressure) -> None:
+        """The soldier's barometer, wherever it is worn."""
+        self._navigator.hear_pressure(pressure.time_ns, pressure.pressure_pa)
+
+    def hear_fix(self, fix: GnssFix) -> None:
+        """A satellite fix with a place and an accuracy, in the navigator's frame of magnetic north."""
+        if fix.height_m is not None and fix.vertical_accuracy_m:
+            self._navigator.hear_height(fix.time_ns, fix.height_m, fix.vertical_accuracy_m)
+        declination = self._declination_rad
+        if fix.latitude_deg is None or fix.longitude_deg is None or fix.horizontal_accuracy_m is None:
+            return
+        if declination is None:
+            return
+        if self._frame is None:
+            self._frame = LocalFrame(Origin(latitude_deg=fix.latitude_deg, longitude_deg=fix.longitude_deg))
+        east, north, _ = self._frame.to_enu(fix.latitude_deg, fix.longitude_deg, 0.0)
+        cosine, sine = math.cos(declination), math.sin(declination)
+        east, north = cosine * east - sine * north, cosine * north + sine * east
+        self._navigator.hear_fix(fix.time_ns, east, north, fix.horizontal_accuracy_m)
+
+    @property
+    def personal_scale(self) -> tuple[float, float] | None:
+        """The person's factor on step length and its sigma; None before a fix has changed them."""
+        return self._navigator.personal_scale if self._navigator.knows_person else None
+
+    def counters(self) -> dict[str, int]:
+        """Counts since the start."""
+        return self._navigator.counters()
+
+    def _learn_earth_field(self, time_ns: int) -> None:
+        """It changes too slowly to be asked for again."""
+        self._declination_rad = 0.0
+        if self._origin is not None:
+            field = earth_field(self._origin, time_ns)
+            self._navigator.know_earth_field(field)
+            self._declination_rad = field.declination_rad
+
+    def _publish(self, steps: Iterable[BodyStepEstimate]) -> Iterator[Envelope]:
+        for step in steps:
+            yield Envelope(self._address, self._message(step))
+            self._steps += 1
+
+    def _message(self, step: BodyStepEstimate) -> BodyStep:
+        compass, satellites = step.compass_azimuth_rad, step.satellite_azimuth_rad
+        height, reliability = step.height, step.reliability
+        return BodyStep(
+            time_ns=step.time_ns,
+            sequence=self._steps,
+            start_time_ns=step.start_ns,
+            length_m=step.length_m,
+            length_sigma_m=step.length_sigma_m,
+            azimuth_rad=self._true(step.azimuth_rad),
+            azimuth_sigma_rad=step.azimuth_sigma_rad,
+            motion=step.motion,
+            direction=step.direction,
+            class_pct=100.0 * step.class_probability,
+            height_m=None if height is None else height.height_m,
+            height_sigma_m=None if height is None else height.sigma_m,
+            floor=None if height is None else height.floor,
+            floor_pct=None if height is None else 100.0 * height.floor_probability,
+            compass_azimuth_rad=None if compass is None else self._true(compass),
+            gyro_azimuth_rad=self._true(step.gyro_azimuth_rad),
+            gnss_azimuth_rad=None if satellites is None else self._true(satellites),
+            azimuth_redundancy_pct=reliability.azimuth_pct,
+            planimetry_redundancy_pct=reliability.planimetry_pct,
+            altimetry_redundancy_pct=reliability.altimetry_pct,
+            external_reliability_m=reliability.external_m,
+        )
+
+    def _true(self, magnetic_rad: float) -> float:
+        return (magnetic_rad + (self._declination_rad or 0.0)) % math.tau

@@ -1,0 +1,70 @@
+"""What to tell a sender of its frames that we heard: only where it helps, on reports that we send anyway.
+
+Feedback costs bits, so it goes to who speaks in updates, and only while some of their last frames were missed, or
+now and then after many, so that they learn how little is lost here. Each goes back to the feedback before the last
+one, so one may be lost.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Final
+
+from sa_hub.radio.content import Feedback
+from sa_hub.radio.replay import Heard
+from sa_hub.radio.update_codec import LONGEST_SPAN, SPAN_STEP
+
+_ENOUGH: Final = 24
+
+
+@dataclass(slots=True)
+class _Told:
+    """Of a sender: its epoch, the counters told up to last and before, its first update, whom it tells of."""
+
+    epoch: int
+    last: int
+    before: int
+    first: int
+    soldiers: set[int] = field(default_factory=set)
+
+
+class Hearing:
+    """The senders of updates on one net."""
+
+    def __init__(self) -> None:
+        self._told: dict[int, _Told] = {}
+
+    def heard_update(self, sender: int, epoch: int, counter: int, soldiers: Iterable[int]) -> None:
+        """This one speaks in updates, of these: feedback is of use to it."""
+        told = self._told.get(sender)
+        if told is None or told.epoch != epoch:
+            told = self._told[sender] = _Told(epoch, counter - 1, counter - 1, counter)
+        told.soldiers.update(soldiers)
+
+    def due(self, heard: Callable[[int], Heard | None]) -> Feedback | None:
+        """Feedback to the one who needs it most, if anyone does; ``heard`` gives what came of a sender."""
+        needs = {sender: self._need(told, heard(sender)) for sender, told in self._told.items()}
+        sender = max(needs, key=lambda each: needs[each], default=None)
+        newest = None if sender is None else heard(sender)
+        if sender is None or newest is None or needs[sender] == 0:
+            return None
+        return _feedback(sender, self._told[sender], newest)
+
+    def sent(self, feedback: Feedback) -> None:
+        """It was on the air."""
+        told = self._told[feedback.about]
+        told.before, told.last = told.last, feedback.newest
+
+    def _need(self, told: _Told, heard: Heard | None) -> int:
+        """How many of its newest frames are worth telling of, the more the more soldiers they tell of."""
+        if heard is None or heard.epoch != told.epoch:
+            return 0
+        new = heard.highest - told.last
+        seen = min(heard.highest - told.first + 1, LONGEST_SPAN)
+        lossy = bool(~heard.mask & ((1 << seen) - 1))
+        return new * len(told.soldiers) if new >= _ENOUGH or (new > 0 and lossy) else 0
+
+
+def _feedback(sender: int, told: _Told, heard: Heard) -> Feedback:
+    wanted = heard.highest - told.before
+    span = min(max(-(-wanted // SPAN_STEP) * SPAN_STEP, SPAN_STEP), LONGEST_SPAN)
+    return Feedback(sender, heard.highest, span, heard.mask >> 1 & ((1 << span) - 1))

@@ -1,0 +1,292 @@
+"""When reports are told: worth against bits, a price that follows the budget, silence, relevance, and loss."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sa_hub.radio.content import Feedback, Report, Reports, Update
+from sa_hub.radio.counters import MemoryCounters
+from sa_hub.radio.frame import Codec
+from sa_hub.radio.grid import Grid
+from sa_hub.radio.hearing import Hearing
+from sa_hub.radio.listeners import Listeners
+from sa_hub.radio.net import RadioNet
+from sa_hub.radio.pacing import Pacing
+from sa_hub.radio.persistence import Persistence
+from sa_hub.radio.picture import Spoken
+from sa_hub.radio.relevance import LEADER, NEAR_OTHERS, NEAR_SEEN, Relevance
+from sa_hub.radio.replay import Heard
+from sa_hub.radio.scheduler import Policy, Room, Scheduler
+from sa_hub.radio.seal import NetKeys, Opener, Sealer
+from sa_hub.settings import LinkProfile
+from support.hub_squad import GROUP_KEY, ORIGIN, START_NS, S
+
+METRE_DEG = 1.0 / 111_133.0
+GRID, CODEC = Grid(ORIGIN), Codec(ORIGIN)
+WIDE = Room(2000.0, 4000.0, 1200.0, 1600.0, 80.0)
+
+
+def at(number: int, seconds: float, north_m: float = 0.0, **options: object) -> Report:
+    """A report from some metres north of the origin."""
+    return Report(
+        number=number,
+        time_ns=START_NS + round(seconds * S),
+        latitude_deg=ORIGIN.latitude_deg + north_m * METRE_DEG,
+        longitude_deg=ORIGIN.longitude_deg,
+        accuracy_m=1.0,
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def scheduler(**policy: float) -> Scheduler:
+    return Scheduler(Policy(**policy), own=1, grid=GRID)
+
+
+def tell(plan: Scheduler, squad: list[Report], room: Room = WIDE, counter: int = 0) -> list[int]:
+    """Let it decide at the time of the newest report, and put what it plans on the air; who was told."""
+    now_ns = max(report.time_ns for report in squad)
+    if not plan.is_due(now_ns):
+        return []
+    plan.pass_time(room, now_ns)
+    content = plan.plan(squad, room, now_ns)
+    if content is None:
+        return []
+    plan.sent(counter, CODEC.decode(1, CODEC.encode(1, content, 3, 999), now_ns).content, now_ns)
+    return [each.number for each in (content.reports if isinstance(content, Reports) else content.entries)]
+
+
+def test_who_was_never_told_is_told_at_once_and_in_full() -> None:
+    plan = scheduler().plan([at(1, 0.0), at(2, 0.0)], WIDE, START_NS)
+    assert isinstance(plan, Reports)
+    assert {report.number for report in plan.reports} == {1, 2}
+
+
+def test_a_prediction_that_holds_is_not_told_and_one_that_fails_is() -> None:
+    plan = scheduler()
+    assert tell(plan, [at(1, 0.0, north_m_s=1.0)]) == [1]
+    for tenths in range(2, 80, 2):
+        # Damped by 60 s, the prediction is 0.5 m short after 8 s.
+        assert tell(plan, [at(1, tenths / 10, north_m=tenths / 10, north_m_s=1.0)], counter=1) == []
+    assert tell(plan, [at(1, 9.0, north_m=30.0, north_m_s=1.0)], counter=1) == [1]
+
+
+def test_what_the_net_told_itself_is_never_repeated_to_it() -> None:
+    plan = scheduler()
+    plan.told(at(2, 40.0))
+    assert plan.plan([at(2, 40.0, north_m=500.0)], WIDE, START_NS + 40 * S) is None
+    assert plan.plan([at(2, 41.0, north_m=500.0)], WIDE, START_NS + 41 * S) is not None
+
+
+def test_our_own_clock_set_back_does_not_silence_us() -> None:
+    plan = scheduler()
+    plan.told(at(1, 3600.0))
+    plan.told(at(2, 3600.0))
+    assert tell(plan, [at(1, 0.0), at(2, 0.0)]) == [1]
+
+
+def test_an_old_report_of_ourselves_is_not_told() -> None:
+    plan = scheduler()
+    assert plan.plan([at(1, 0.0)], WIDE, START_NS + 3 * S) is None
+    assert plan.plan([at(2, 0.0)], WIDE, START_NS + 3 * S) is not None
+
+
+def test_after_the_clock_was_set_back_all_is_told_in_full() -> None:
+    plan = scheduler()
+    tell(plan, [at(1, 3600.0)])
+    plan.set_back(3600 * S)
+    content = plan.plan([at(1, 1.0)], WIDE, START_NS + S)
+    assert isinstance(content, Reports)
+
+
+def test_what_is_forgotten_is_told_in_full_again() -> None:
+    plan = scheduler()
+    tell(plan, [at(1, 0.0), at(2, 0.0)])
+    assert plan.plan([at(1, 1.0), at(2, 1.0)], WIDE, START_NS + S) is None
+    plan.forget([2])
+    content = plan.plan([at(1, 2.0), at(2, 2.0)], WIDE, START_NS + 2 * S)
+    assert isinstance(content, Reports)
+    assert [report.number for report in content.reports] == [2]
+
+
+def test_later_news_go_as_an_update_and_only_what_has_changed() -> None:
+    plan = scheduler()
+    tell(plan, [at(1, 0.0), at(2, 0.0, floor=1)])
+    content = plan.plan([at(1, 1.0, north_m=20.0), at(2, 1.0, north_m=20.0, floor=2)], WIDE, START_NS + S)
+    assert isinstance(content, Update)
+    assert [(entry.level is not None, entry.quality is not None) for entry in content.entries] == [
+        (False, False),
+        (True, False),
+    ]
+
+
+def test_the_price_rises_as_the_bucket_empties_and_settles_where_it_is_half_full() -> None:
+    pacing = Pacing()
+    prices = []
+    for fill in (1.0, 0.75, 0.5, 0.25, 0.0):
+        pacing.passed(0.0, fill)
+        prices.append(pacing.price)
+    ratios = [after / before for before, after in itertools.pairwise(prices)]
+    assert ratios == pytest.approx([math.e] * 4)  # four e-folds from full to empty
+    for _ in range(60):
+        pacing.passed(1.0, 0.5)
+    assert pacing.price == pytest.approx(prices[2])
+    for _ in range(60):
+        pacing.passed(1.0, 1.0)
+    assert pacing.price < prices[0]
+
+
+def squad_net(rate_bits_per_s: int, **options: object) -> RadioNet:
+    profile = LinkProfile(name="squad", rate_bits_per_s=rate_bits_per_s, header_bytes=0, **options)  # type: ignore[arg-type]
+    keys = NetKeys(GROUP_KEY, "squad", 8)
+    return RadioNet(profile, Policy(), 1, Codec(ORIGIN), Sealer(keys, 1, MemoryCounters()), Opener(keys))
+
+
+@pytest.mark.parametrize("rate", [75, 1200, 1_000_000])
+def test_nobody_starves_and_the_budget_holds(rate: int) -> None:
+    """Eleven who walk round in circles and one who stands: all are heard of, and no window is overdrawn."""
+    net = squad_net(rate)
+    ear = squad_net(rate)
+    ear._number = 2
+    heard: dict[int, list[float]] = {number: [] for number in range(1, 13)}
+    sent: list[tuple[float, int]] = []
+    for tenths in range(0, 2000, 2):
+        turn = tenths / 10 * 0.08
+        squad = [
+            at(number, tenths / 10, 25.0 * math.sin(turn + number), north_m_s=2.0 * math.cos(turn + number))
+            for number in range(1, 12)
+        ]
+        squad.append(at(12, tenths / 10))
+        for frame in net.speak(squad, START_NS + tenths * S // 10):
+            sent.append((tenths / 10, 8 * len(frame)))
+            told = ear.hear(frame, START_NS + tenths * S // 10, range(1, 13), exercise=False)
+            assert told is not None
+            assert isinstance(told[1], Reports)
+            for report in told[1].reports:
+                heard[report.number].append(tenths / 10)
+    for first, (begin_s, _) in enumerate(sent):
+        sums = itertools.accumulate(bits for _, bits in sent[first:])
+        for total, (end_s, _) in zip(sums, sent[first:], strict=True):
+            assert total <= rate * (end_s - begin_s) + rate * min(max(4000 / rate, 2.0), 40.0) + 1e-6
+    longest_s = max(
+        after - before for times in heard.values() for before, after in itertools.pairwise([*times, 200.0])
+    )
+    assert longest_s < {75: 100.0, 1200: 45.0, 1_000_000: 30.0}[rate]
+    spent = sum(bits for _, bits in sent) / 200.0
+    assert spent <= min(rate, 20_000)  # with plenty to spend no more is sent than helps
+    if rate == 75:
+        assert spent > 0.8 * rate
+
+
+def test_leaders_and_who_is_near_another_squad_or_something_seen_matter_more() -> None:
+    relevance = Relevance({1: "a", 2: "a", 3: "b", 4: "a", 5: "a"}, leaders={4})
+    relevance.saw(START_NS, ORIGIN.latitude_deg + 2000 * METRE_DEG, ORIGIN.longitude_deg)
+    north_m = np.array([0.0, 300.0, 90.0, 700.0, 1900.0])
+    latitude = ORIGIN.latitude_deg + north_m * METRE_DEG
+    longitude = np.full(5, ORIGIN.longitude_deg)
+    weights = relevance.weights([1, 2, 3, 4, 5], latitude, longitude, START_NS + S)
+    assert weights.tolist() == [NEAR_OTHERS, 1.0, NEAR_OTHERS, LEADER, NEAR_SEEN]
+    later = relevance.weights([5], latitude[4:], longitude[4:], START_NS + 601 * S)
+    assert later.tolist() == [1.0]
+
+
+def test_blue_on_blue_goes_first() -> None:
+    """Two alike but for another squad's soldier beside one of them; room for one only."""
+    plan = scheduler()
+    plan.relevance = Relevance({2: "a", 3: "a", 4: "b"})
+    squad = [at(2, 0.0), at(3, 0.0, 1000.0), at(4, 0.0, 1050.0)]
+    for counter in range(3):
+        tell(plan, [replace(each, time_ns=START_NS + counter * S) for each in squad], counter=counter)
+    moved = [at(2, 4.0, 12.0), at(3, 4.0, 1012.0), at(4, 4.0, 1050.0)]
+    content = plan.plan(moved, replace(WIDE, payload_bits=47.0), START_NS + 4 * S)
+    assert isinstance(content, Update)
+    assert [entry.number for entry in content.entries] == [3]
+
+
+def walked(legs_s: float, seconds: int = 60) -> Persistence:
+    """One who goes to and fro at 1 m/s in legs of this length."""
+    persistence = Persistence()
+    persistence.widen(1)
+    north_m = 0.0
+    for second in range(seconds):
+        speed = 1.0 if int(second / legs_s) % 2 == 0 else -1.0
+        sample = [second, ORIGIN.latitude_deg + north_m * METRE_DEG, ORIGIN.longitude_deg, 0.0, speed]
+        persistence.see(np.array([0]), np.array([sample]), 8.0)
+        north_m += speed
+    return persistence
+
+
+@pytest.mark.parametrize(("legs_s", "lasts"), [(1000.0, True), (4.0, False)])
+def test_a_velocity_that_does_not_last_is_not_told(legs_s: float, lasts: bool) -> None:
+    share = walked(legs_s).shares(np.array([0]))[0]
+    assert share == pytest.approx(1.0 if lasts else 0.0, abs=1e-2)
+
+
+# -- who has heard what -------------------------------------------------------------------------------------------
+
+
+def spoken(*slots: int, misses: int | None = None, second: float = 0.0) -> Spoken:
+    place = np.full(len(slots), 59.0)
+    still = np.zeros(len(slots))
+    return Spoken(
+        np.array(slots, dtype=np.int64), np.full(len(slots), second), place, still, still, still, misses
+    )
+
+
+def test_stand_ins_miss_about_as_much_as_assumed() -> None:
+    listeners = Listeners(0.25, seed=1)
+    listeners.widen(1)
+    for counter in range(400):
+        listeners.spoke(counter, spoken(0))
+    assert listeners.pictures.missed.mean() == pytest.approx(100.0, rel=0.1)
+
+
+def test_feedback_makes_certain_who_has_what() -> None:
+    listeners = Listeners(0.5, seed=1)
+    listeners.widen(2)
+    for counter in range(8):
+        listeners.spoke(counter, spoken(0 if counter < 6 else 1, second=float(counter)))
+    # Heard up to counter 6, but neither 4 nor 5.
+    listeners.told(9, Feedback(1, 6, 8, 0b0000_1100_1111_00 >> 2 & ~0b11), START_NS)
+    pictures = listeners.pictures
+    assert listeners.tell
+    assert set(pictures.time_s[:, 0].tolist()) == {3.0}
+    assert set(pictures.time_s[:, 1].tolist()) == {6.0, 7.0}  # of the last one nobody has told
+    assert set(pictures.behind(np.array([0]))[:, 0].tolist()) <= {2, 3}
+
+
+def test_feedback_lowers_or_raises_the_loss_that_is_assumed() -> None:
+    listeners = Listeners(0.2, seed=1)
+    listeners.widen(1)
+    for counter in range(200):
+        listeners.spoke(counter, spoken(0))
+        if counter % 8 == 7:
+            listeners.told(9, Feedback(1, counter % 256, 8, 0xFF), START_NS + counter * S)
+    assert listeners.loss < 0.01
+
+
+def test_a_listener_that_has_long_been_silent_is_dropped() -> None:
+    listeners = Listeners(0.2, seed=1)
+    listeners.widen(1)
+    listeners.spoke(0, spoken(0))
+    listeners.told(9, Feedback(1, 0, 4, 0), START_NS)
+    listeners.told(8, Feedback(1, 0, 4, 0), START_NS + 400 * S)
+    assert listeners._certain.rows == 1
+
+
+def test_feedback_goes_to_who_was_missed_and_costs_nothing_otherwise() -> None:
+    hearing = Hearing()
+    hearing.heard_update(5, epoch=1, counter=10, soldiers=[7])
+    assert hearing.due({5: Heard(1, 20, mask=0b111_1111_1111)}.get) is None
+    feedback = hearing.due({5: Heard(1, 20, mask=0b111_1110_0111)}.get)
+    assert feedback == Feedback(5, 20, 12, 0b0011_1111_0011)
+    hearing.heard_update(6, epoch=1, counter=15, soldiers=[8, 9, 10])
+    memory = {5: Heard(1, 20, mask=0b111_1110_0111), 6: Heard(1, 20, mask=0b10_0001)}
+    other = hearing.due(memory.get)
+    assert other is not None
+    assert other.about == 6  # fewer frames, but of more soldiers
+    hearing.sent(feedback)
+    assert hearing.due({5: Heard(1, 20, mask=0b111_1110_0111)}.get) is None
+    assert hearing.due(lambda _sender: None) is None
