@@ -5,6 +5,7 @@ come over the air. As many processes are starting at a time as the machine's pro
 """
 
 import os
+import random
 import socket
 import time
 from collections import deque
@@ -12,6 +13,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 from types import TracebackType
 
@@ -46,6 +48,7 @@ _AT_ONCE_PER_PROCESSOR = 3
 # Host seconds for the gateways to start before the walks do: a base, each one's imports, each second of a unit.
 _LEAD_S, _LEAD_PER_GATEWAY_S, _LEAD_PER_PLAYED_S = 5.0, 1.0, 2e-4
 _LEAD_TRIES = (1.0, 3.0, 9.0)
+_OWN_PORTS = (10_000, 32_000)
 _LAST_CALL_S = 3.0  # host seconds before the walks: who is not there then will not be
 
 OnProgress = Callable[[int, int], None]
@@ -289,12 +292,23 @@ def _lead_s(soldiers: Sequence[Soldier]) -> float:
 
 
 def free_ports(count: int, kind: socket.SocketKind) -> list[int]:
-    """Ports that are free on loopback now (all held open at once, so they differ)."""
-    sockets = [socket.socket(socket.AF_INET, kind) for _ in range(count)]
-    try:
-        for each in sockets:
-            each.bind(("127.0.0.1", 0))
-        return [each.getsockname()[1] for each in sockets]
-    finally:
-        for each in sockets:
-            each.close()
+    """Ports that are free on loopback now, of those that the system gives to nobody who only asks for any.
+
+    A port from the system's own range could go to the next socket that asks before its process has come to bind it.
+    """
+    first = random.SystemRandom().randrange(*_OWN_PORTS)
+    free = (
+        port
+        for port in chain(range(first, _OWN_PORTS[1]), range(_OWN_PORTS[0], first))
+        if _is_free(port, kind)
+    )
+    return list(islice(free, count))
+
+
+def _is_free(port: int, kind: socket.SocketKind) -> bool:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
