@@ -14,7 +14,7 @@ from sa_hub.radio.control import MOST_ACKNOWLEDGED, Acknowledgement, Asked, Frag
 from sa_hub.radio.fragments import CAPACITY as MOST_COLLECTED
 from sa_hub.radio.fragments import HEAD_BYTES, KEEP_NS, Collector, Cutter
 from sa_hub.radio.outbox import CAPACITY, Outbox, Sending
-from support.hub_squad import START_NS, Air, S, Walk, hub, link, own_identity, position
+from support.hub_squad import START_NS, Air, S, Walk, hub, link, own_identity
 
 
 def alert(seconds: float = 0.0, text: str = "") -> AlertNotice:
@@ -252,18 +252,26 @@ def test_alerts_reach_everybody_in_time_at_thirty_percent_loss_while_positions_f
     assert figure.within_pct == 100.0
 
 
-def test_an_alert_goes_at_once_though_positions_use_up_the_budget() -> None:
-    """At 100 bit/s positions leave no more than a report's 168 bits; 576 bits are kept, the alert takes 448."""
-    core = hub("a1", link("squad", 100, header_bytes=0), threshold_m=0.1)
+def test_an_alert_goes_at_once_though_all_else_uses_up_the_budget() -> None:
+    """At 100 bit/s observations take all but the 576 bits that are kept; the alert takes 448, in full 496."""
+    core = hub("a1", link("squad", 100, header_bytes=0))
     help_wanted = Alert(time_ns=START_NS + 110 * S, soldier="a1", kind="help", text="x" * 40)
     for tenth in range(1101):
         now_ns = START_NS + tenth * S // 10
-        core.handle(position("a1", now_ns, Walk(turn_deg=120.0)))
+        if tenth % 10 == 0:
+            core.handle(said("a1", "observation", drone(now_ns)))
         if tenth == 1100:
-            assert len(core.take_frames()) > 20
+            assert len(core.take_frames()) > 30
             core.handle(said("a1", "alert", help_wanted))
         core.tick(now_ns)
     assert [len(frame.data) for frame in core.take_frames()] in ([56], [62])
+
+
+def drone(time_ns: int) -> Observation:
+    """Somebody of a1 saw one."""
+    return Observation(
+        time_ns=time_ns, soldier="a1", latitude_deg=59.0, longitude_deg=18.0, accuracy_m=3.0, code="drone"
+    )
 
 
 def test_once_acknowledged_an_alert_costs_nothing_more() -> None:
