@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bootprint.commands.options import write_text
 from bootprint.config import load_computer
-from bootprint.errors import ConfigError, RecordingError
+from bootprint.errors import RecordingError
 from proving_ground.compass_calibration import compass
 
 if TYPE_CHECKING:
@@ -47,14 +48,7 @@ def foot_magnetometer(
         fit = fit_ellipsoid(mag_ut, None if config is None else _strength_ut(config))
     except RecordingError as error:
         raise RecordingError(f"{recording}: {chosen}: {error}") from error
-    text = calibration_table(chosen, fit)
-    if output is None:
-        typer.echo(text, nl=False)
-        return
-    try:
-        output.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"--output {output}: cannot be written: {error.strerror}") from error
+    write_text(calibration_table(chosen, fit), output)
 
 
 def _samples(recording: Path, place: str | None) -> "tuple[str, Float64Array]":

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bootprint.commands.options import write_text
 from bootprint.errors import ConfigError, RecordingError
 
 if TYPE_CHECKING:
@@ -50,14 +51,7 @@ def compass(
         raise ConfigError(f"--ahead {ahead}: no axis; known: {', '.join(AXES)}")
     if walk is None and azimuth_deg is not None:
         raise ConfigError("--azimuth-deg needs --walk, the recording of that way")
-    text = _calibrated(turn, walk, azimuth_deg, ahead)
-    if output is None:
-        typer.echo(text, nl=False)
-        return
-    try:
-        output.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"--output {output}: cannot be written: {error.strerror}") from error
+    write_text(_calibrated(turn, walk, azimuth_deg, ahead), output)
 
 
 def _calibrated(turn: Path, walk: Path | None, azimuth_deg: float | None, ahead: str) -> str:

@@ -164,34 +164,15 @@ def sweep(
 
     Example: bootprint exercise sweep building-clearing --seeds 10 --set net.loss=0,0.1,0.3
     """
-    from proving_ground.exercises.playing import Playing, progress_bars
     from proving_ground.exercises.settings import check_settings
     from proving_ground.exercises.source import check_scenario
-    from proving_ground.exercises.sweep import (
-        aggregate,
-        combinations,
-        parse_values,
-        sweep_locally,
-        sweep_on_dask,
-    )
+    from proving_ground.exercises.sweep import combinations, parse_values, play_seed, swept
 
     grid = combinations(dict(parse_values(text) for text in parameters or ()))
-    numbers = range(1, seeds + 1)
     check_scenario(scenario)
     for settings in grid:
         check_settings(settings)
-    with progress_bars() as show:
-
-        def done(share: float) -> None:
-            show("seeds", share)
-
-        done(0.0)
-        if dask is None:
-            processes = Playing(Path(), workers=workers).local_workers
-            by_seed = sweep_locally(scenario, numbers, grid, processes, done)
-        else:
-            by_seed = sweep_on_dask(scenario, numbers, grid, dask, done)
-    rows = aggregate(grid, by_seed)
+    rows = swept(scenario, seeds, grid, workers, dask, play_seed)
     if json_out is not None:
         write_json(rows, json_out)
     if json_out != "-":

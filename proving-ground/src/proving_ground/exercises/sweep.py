@@ -8,6 +8,7 @@ import multiprocessing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent import futures as local
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -124,6 +125,27 @@ def aggregate(grid: Sequence[Settings], by_seed: Mapping[int, Sequence[Figures]]
                 row = {"figure": figure, "n": mean.n, "mean": mean.mean, "half_width_95": mean.half_width}
                 rows.append({**settings, **row})
     return rows
+
+
+def swept(
+    subject: str, seeds: int, grid: Sequence[Settings], workers: int, dask: str | None, job: Job
+) -> list[Row]:
+    """The rows of ``subject`` over seeds 1, 2, …, with a progress bar: on ``dask``, or on so many local workers."""
+    from proving_ground.exercises.playing import Playing, progress_bars
+
+    numbers = range(1, seeds + 1)
+    with progress_bars() as show:
+
+        def done(share: float) -> None:
+            show("seeds", share)
+
+        done(0.0)
+        if dask is None:
+            processes = Playing(Path(), workers=workers).local_workers
+            by_seed = sweep_locally(subject, numbers, grid, processes, done, job)
+        else:
+            by_seed = sweep_on_dask(subject, numbers, grid, dask, done, job)
+    return aggregate(grid, by_seed)
 
 
 def sweep_locally(

@@ -111,14 +111,7 @@ def sweep(
 
     Example: bootprint radio sweep patrol --set bitrate=20,34,60 --set loss=0,0.2 --set format=bootprint
     """
-    from proving_ground.exercises.playing import Playing, progress_bars
-    from proving_ground.exercises.sweep import (
-        aggregate,
-        combinations,
-        parse_values,
-        sweep_locally,
-        sweep_on_dask,
-    )
+    from proving_ground.exercises.sweep import combinations, parse_values, swept
     from proving_ground.radio_load.load_sweep import load_of, play_load_seed
     from proving_ground.radio_load.squad_tracks import check_tracks
     from proving_ground.radio_load.tables import print_table, sweep_table
@@ -127,19 +120,7 @@ def sweep(
     check_tracks(tracks, None)
     for settings in grid:
         load_of(tracks, settings)
-    numbers = range(1, seeds + 1)
-    with progress_bars() as show:
-
-        def done(share: float) -> None:
-            show("seeds", share)
-
-        done(0.0)
-        if dask is None:
-            processes = Playing(Path(), workers=workers).local_workers
-            by_seed = sweep_locally(tracks, numbers, grid, processes, done, play_load_seed)
-        else:
-            by_seed = sweep_on_dask(tracks, numbers, grid, dask, done, play_load_seed)
-    rows = aggregate(grid, by_seed)
+    rows = swept(tracks, seeds, grid, workers, dask, play_load_seed)
     if json_out is not None:
         write_json(rows, json_out)
     if json_out != _STDOUT:

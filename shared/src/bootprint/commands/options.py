@@ -34,6 +34,17 @@ def parse_speed(speed: str) -> float:
     return factor
 
 
+def write_text(text: str, output: Path | None) -> None:
+    """Write a text to the file of ``--output``, or to standard output without one."""
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    try:
+        output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"--output {output}: cannot be written: {error.strerror}") from error
+
+
 def write_json(value: object, target: str) -> None:
     """Write a value as JSON to a file, or to standard output if ``target`` is ``-``."""
     text = msgspec.json.format(msgspec.json.encode(value), indent=2).decode()
