@@ -98,7 +98,8 @@ def test_the_command_post_hears_of_the_soldier_over_the_air_only(played: Played)
     assert newest.via == "company"
     last = played.heard["a1"].positions[-1]
     assert abs(newest.latitude_deg - last.latitude_deg) * 111_000 < 4.0
-    assert played.nets["squad"].datagrams >= reports
+    # Each hop's receiver has a report per datagram at most; a relay may tell what it heard once again, moved on.
+    assert played.nets["squad"].datagrams >= len(played.heard[LEADER].reports["a1"]) > 0
     assert played.nets["company"].datagrams >= reports
 
 
