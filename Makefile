@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 ROOMS := shared services/sensor-gateway services/pdr-engine services/fusion services/sa-hub proving-ground
 READY := $(VENV)/.ready
 
-.PHONY: help setup demo test check format golden figures vectors fuzz compose-test constraints clean
+.PHONY: help setup demo test check format golden figures vectors fuzz compose-test wheels constraints clean
 
 help: ## show what there is to make
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -58,6 +58,10 @@ fuzz: $(READY) ## ten million mutated and random radio frames (ARGS='--frames 10
 
 compose-test: ## build the image, run docker-compose.yml for real (needs a Docker engine)
 	deploy/compose-test
+
+wheels: $(READY) ## all that an installation without a network needs, tried out; ARGS=aarch64: for ARM boards, not tried
+	deploy/wheelhouse wheels $(ARGS)
+	$(if $(ARGS),,deploy/offline-test wheels)
 
 constraints: ## write constraints.txt anew from a fresh environment (newest versions)
 	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new

@@ -5,9 +5,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
+from bootprint.processes import ProcessGroup, ProcessSpec
 from proving_ground.exercises.exercise import Fault
 from proving_ground.exercises.process_faults import ProcessFaults
-from proving_ground.exercises.processes import ProcessGroup, ProcessSpec
 from proving_ground.exercises.stage import Stage
 from support.waiting import wait_until
 

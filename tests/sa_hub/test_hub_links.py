@@ -1,6 +1,5 @@
 """UDP links over real loopback sockets: unicast, multicast, and addresses that cannot be used."""
 
-import queue
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -11,6 +10,7 @@ from bootprint.errors import ConfigError
 from sa_hub.radio.links.udp import UdpLink
 from sa_hub.settings import LinkProfile
 from support.hub_squad import START_NS, S, Walk, hub, position
+from support.link_ears import Ears
 
 GROUP = "239.255.77.7"
 
@@ -27,21 +27,20 @@ def free_port() -> int:
 
 
 @pytest.fixture
-def opened() -> Iterator[Callable[[LinkProfile], tuple[UdpLink, "queue.Queue[bytes]"]]]:
+def opened() -> Iterator[Callable[[LinkProfile], tuple[UdpLink, Ears]]]:
     """Makes running links that are closed in the end."""
     with ExitStack() as stack:
 
-        def make(link_profile: LinkProfile) -> tuple[UdpLink, "queue.Queue[bytes]"]:
-            inbox: queue.Queue[bytes] = queue.Queue()
-            link = UdpLink(link_profile, inbox.put)
-            stack.callback(link.close)
-            link.start()
-            return link, inbox
+        def make(link_profile: LinkProfile) -> tuple[UdpLink, Ears]:
+            ears = Ears(lambda on_frame: UdpLink(link_profile, on_frame))
+            assert isinstance(ears.link, UdpLink)
+            stack.callback(ears.link.close)
+            return ears.link, ears
 
         yield make
 
 
-Make = Callable[[LinkProfile], tuple[UdpLink, "queue.Queue[bytes]"]]
+Make = Callable[[LinkProfile], tuple[UdpLink, Ears]]
 
 
 def test_a_datagram_reaches_every_peer_unchanged(opened: Make) -> None:
@@ -80,7 +79,7 @@ def test_what_the_system_refuses_to_send_is_counted(opened: Make) -> None:
     assert mouth.send_faults == 1
 
 
-def test_closing_twice_ends_the_thread() -> None:
+def test_closing_twice_frees_the_socket() -> None:
     link = UdpLink(profile(bind="127.0.0.1:0"), lambda data: None)
     link.start()
     link.close()

@@ -2,7 +2,6 @@
 
 import itertools
 import os
-import queue
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -23,12 +22,12 @@ from sa_hub.radio.links.file_line import frames_in, line_of
 from sa_hub.radio.links.opening import Surroundings, open_link
 from support.hub_processes import write_computer, write_realm
 from support.hub_squad import START_NS, S, Walk, hub, link, own_identity, position
+from support.link_ears import Ears
 from support.routers import free_endpoint, running_router
 from support.waiting import wait_until
 
 NOW_NS = START_NS + 5
-Inbox = queue.Queue[bytes]
-Make = Callable[..., tuple[Link, Inbox]]
+Make = Callable[..., tuple[Link, Ears]]
 
 
 @pytest.fixture
@@ -36,13 +35,12 @@ def opened(tmp_path: Path) -> Iterator[Make]:
     """Makes running links that are closed in the end; ``number`` is whose computer it is."""
     with ExitStack() as stack:
 
-        def make(number: int = 1, **options: object) -> tuple[Link, Inbox]:
+        def make(number: int = 1, **options: object) -> tuple[Link, Ears]:
             profile = LinkProfile(name="squad", rate_bits_per_s=9600, **options)  # type: ignore[arg-type]
-            inbox: Inbox = queue.Queue()
-            made = open_link(profile, inbox.put, Surroundings("bp", number, tmp_path, lambda: NOW_NS))
-            stack.callback(made.close)
-            made.start()
-            return made, inbox
+            around = Surroundings("bp", number, tmp_path, lambda: NOW_NS)
+            ears = Ears(lambda on_frame: open_link(profile, on_frame, around))
+            stack.callback(ears.link.close)
+            return ears.link, ears
 
         yield make
 

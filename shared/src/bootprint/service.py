@@ -5,6 +5,7 @@ many times a second, posted jobs come through an inbox at once, `tick` comes wit
 So a core is never called from two threads, and a quiet process sleeps.
 """
 
+import gc
 import queue
 import resource
 import sys
@@ -30,8 +31,8 @@ from bootprint.topics import Identity
 from bootprint.zenoh_bus import Inlet, ZenohBus, open_bus
 
 _INBOX_SIZE = 20_000
-_FETCH_S = 0.1  # event time between two looks at the bus: fewer wake-ups are what many processes live on
-_LEAST_FETCH_S = 0.002
+DEFAULT_BEAT_S = 0.05
+_LEAST_BEAT_S = 0.002
 _TICK_S = 0.1
 _HEALTH_S = 1.0
 EXIT_BAD_INPUT = 2
@@ -103,12 +104,16 @@ class Options:
     clock_origin_s: float | None = None
     wait_for: tuple[str, ...] = ()
     stop_on_eof: bool = False
+    beat_s: float = DEFAULT_BEAT_S
     log_level: str = "info"
     log_json: bool = False
 
 
 class Context:
-    """What a part may use of the world outside it."""
+    """What a part may use of the world outside it.
+
+    ``beat_s``: host seconds between two looks at bus and clock; a part that waits for neither may lengthen it.
+    """
 
     def __init__(self, service: str, computer: Computer, options: Options) -> None:
         self.service = service
@@ -120,6 +125,7 @@ class Context:
             service=service, soldier=self.identity.soldier
         )
         self.lossless = options.speed == "max"
+        self.beat_s = _beat_s(options)
         self.inbox: queue.Queue[Job] = queue.Queue(_INBOX_SIZE)
         self.inbox_dropped = 0
         self.stopping = Stop()
@@ -203,6 +209,12 @@ class Service:
         ] = None,
         wait_for: Annotated[str, typer.Option(help="Services to wait for before replaying: a,b,c.")] = "",
         stop_on_eof: Annotated[bool, typer.Option(help="Stop when standard input closes.")] = False,
+        beat: Annotated[
+            float,
+            typer.Option(
+                min=0.002, max=1.0, help="Seconds between two looks at the bus; more saves processor."
+            ),
+        ] = DEFAULT_BEAT_S,
         log_level: Annotated[str, typer.Option(help="debug, info, warning or error.")] = "info",
         log_json: Annotated[bool, typer.Option(help="Log one JSON object a line.")] = False,
     ) -> None:
@@ -214,6 +226,7 @@ class Service:
             clock_origin_s=clock_origin,
             wait_for=tuple(name for name in wait_for.split(",") if name),
             stop_on_eof=stop_on_eof,
+            beat_s=beat,
             log_level=log_level,
             log_json=log_json,
         )
@@ -241,6 +254,8 @@ def _run(service: Service, context: Context) -> int:
         inlets = [bus.open_inlet(context.identity.selector(subject)) for subject in service.subjects]
         part.start()
         bus.declare_alive(context.identity, service.name)
+        gc.collect()
+        gc.freeze()  # what has been imported stays: no collection need look at it again
         context.log.info("running", router=context.options.router or context.computer.router)
         _Loop(service, part, context, inlets).run()
         context.log.info("stopped", exit_code=context.exit_code)
@@ -256,11 +271,11 @@ def _resident_mb() -> float:
     return pages * resource.getpagesize() / 1e6
 
 
-def _fetch_interval_s(context: Context) -> float:
+def _beat_s(options: Options) -> float:
     """Host seconds between two looks at the bus: what a message may wait is a matter of event time."""
-    if context.lossless:
-        return _LEAST_FETCH_S
-    return max(_LEAST_FETCH_S, _FETCH_S / float(context.options.speed))
+    if options.speed == "max":
+        return _LEAST_BEAT_S
+    return max(_LEAST_BEAT_S, options.beat_s / float(options.speed))
 
 
 class _Loop:
@@ -271,7 +286,6 @@ class _Loop:
         self._part = part
         self._context = context
         self._inlets = inlets
-        self._fetch_s = _fetch_interval_s(context)
         self._errors = 0
         self._health_sequence = 0
         self._connected = True
@@ -284,9 +298,9 @@ class _Loop:
             self._work(next_fetch)
             found = self._fetch()
             now = time.monotonic()
-            next_fetch = now if found and context.lossless else now + self._fetch_s
+            next_fetch = now if found and context.lossless else now + context.beat_s
             if now >= next_tick:
-                next_tick = now + _TICK_S
+                next_tick = now + (_TICK_S if context.lossless else context.beat_s)
                 self._guarded(lambda: part.tick(context.clock.now_ns()))
             if now >= next_health:
                 next_health = now + _HEALTH_S

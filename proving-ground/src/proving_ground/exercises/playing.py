@@ -14,8 +14,8 @@ from bootprint.stopping import Stop
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from bootprint.processes import ProcessError
     from proving_ground.exercises.exercise import Exercise
-    from proving_ground.exercises.processes import ProcessError
     from proving_ground.exercises.result import Result
     from proving_ground.exercises.stage import Stage
     from proving_ground.exercises.usage import UsageMeter
@@ -140,8 +140,8 @@ def progress_bars() -> Iterator[Callable[[str, float], None]]:
 
 
 def _in_processes(exercise: "Exercise", how: Playing) -> Outcome:
+    from bootprint.processes import ProcessError
     from proving_ground.exercises.inprocess_play import SETTLE_S
-    from proving_ground.exercises.processes import ProcessError
     from proving_ground.exercises.stage import Play, Stage
 
     length_s = exercise.duration_s + SETTLE_S if how.duration_s is None else how.duration_s

@@ -20,7 +20,9 @@ from types import TracebackType
 from bootprint.clock import NS_PER_S, ScaledClock
 from bootprint.errors import BootprintError, ConfigError
 from bootprint.geodesy import LocalFrame
+from bootprint.processes import ProcessGroup, ProcessSpec
 from bootprint.recording import Recorder
+from bootprint.service import DEFAULT_BEAT_S
 from bootprint.stopping import Stop
 from bootprint.zenoh_bus import EmbeddedRouter
 from pdr_engine.foot import warm_up
@@ -35,7 +37,6 @@ from proving_ground.exercises.exercise_files import (
 )
 from proving_ground.exercises.observer import Observers
 from proving_ground.exercises.process_faults import ProcessFaults
-from proving_ground.exercises.processes import ProcessGroup, ProcessSpec
 from proving_ground.exercises.run_files import with_files
 from proving_ground.exercises.serial_feed import SerialFeed
 from proving_ground.exercises.truth_record import record_truth
@@ -45,6 +46,8 @@ SOLDIER_SERVICES = ("pdr-engine", "fusion", "sa-hub")
 POST_SERVICES = ("sa-hub",)
 _READY_TIMEOUT_S = 120.0  # for one process
 _AT_ONCE_PER_PROCESSOR = 3
+BUSY_BEAT_S = 0.1
+_BUSY_COMPUTERS = 6  # of soldiers, on each processor of this machine
 # Host seconds for the gateways to start before the walks do: a base, each one's imports, each second of a unit.
 _LEAD_S, _LEAD_PER_GATEWAY_S, _LEAD_PER_PLAYED_S = 5.0, 1.0, 2e-4
 _LEAD_TRIES = (1.0, 3.0, 9.0)
@@ -183,10 +186,16 @@ class Stage:
                     *("--speed", str(self._play.speed)),
                     *("--clock-origin", f"{self._origin_s:.6f}"),
                     *("--router-wait", "30"),
+                    *("--beat", f"{self._beat_s():.3f}"),
                 ),
                 log=folder / f"{service}.log",
             )
         )
+
+    def _beat_s(self) -> float:
+        """As often as one soldier's computer looks at its bus, if the machine has the processors for it."""
+        of_each = len(self.exercise.computers) / (os.cpu_count() or 1)
+        return BUSY_BEAT_S if of_each > _BUSY_COMPUTERS else DEFAULT_BEAT_S
 
     def wait_ready(self, stop: Stop, on_progress: OnProgress = lambda _done, _of: None) -> None:
         """Start all services but the gateways; StageError names those that do not come up."""

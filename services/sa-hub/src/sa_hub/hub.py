@@ -6,7 +6,7 @@ their time, so decisions do not depend on how often `tick` is called.
 """
 
 from collections import Counter, OrderedDict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -327,17 +327,22 @@ class HubCore:
             self._frames += [OutgoingFrame(name, data) for data in frames]
 
     def _candidates(self, step_ns: int) -> list[Report]:
-        """Our own report and, from a relay, everyone's that is not lost and may pass another relay."""
-        candidates: list[Report] = []
+        """Our own report and, from a relay, others' that it may pass on; by number."""
+        own_known = self._tracks.get(self._member.number)
+        own = None
+        if own_known is not None and own_known.state != "lost":
+            own = self._own.at(step_ns, self._now_ns)
+        candidates = [] if own is None else [own]
+        if self._settings.relays:
+            candidates += self._to_pass_on()
+        return sorted(candidates, key=lambda report: report.number)
+
+    def _to_pass_on(self) -> Iterator[Report]:
+        """Others' reports that are not lost and may pass another relay."""
         for known in self._tracks.all():
-            if known.state == "lost":
-                continue
-            if known.report.number == self._member.number:
-                own = self._own.at(step_ns, self._now_ns)
-                candidates += [] if own is None else [own]
-            elif self._settings.relays and known.report.hops < MAX_HOPS:
-                candidates.append(known.passed_on)
-        return candidates
+            passable = known.state != "lost" and known.report.hops < MAX_HOPS
+            if passable and known.report.number != self._member.number:
+                yield known.passed_on
 
     def _each_second(self, second_ns: int) -> Iterable[Envelope]:
         """Link reports, and a command post that still stands where it was put."""

@@ -25,6 +25,8 @@ from sa_hub.settings import HubSettings, LinkProfile, check_settings
 
 _LATENCIES: Final = 512
 _STOOD_STILL_S: Final = 0.5  # host time; ticks come every 0.1 s
+_MOST_WAITING: Final = 8192
+"""Frames kept between two looks; of a flood the newest."""
 
 
 class LatencyGauge:
@@ -66,7 +68,9 @@ class HubPart:
         self._latency = LatencyGauge(context.clock)
         self._memories = memories
         self._memory_faults = 0
+        self._frames_dropped = 0
         self._ticked_ns: int | None = None
+        self._arrivals: deque[tuple[str, bytes]] = deque(maxlen=_MOST_WAITING)
         self._links = self._open(settings.links)
 
     def _open(self, profiles: Iterable[LinkProfile]) -> dict[str, Link]:
@@ -82,14 +86,21 @@ class HubPart:
             link.start()
 
     def _arrived(self, name: str, data: bytes) -> None:
-        """In the link's thread: hand the frame to the main loop."""
-        self._context.post(lambda: self._receive(name, data))
+        """Perhaps in the link's thread: the frame waits for the next look, and nobody is woken."""
+        self._frames_dropped += len(self._arrivals) == _MOST_WAITING
+        self._arrivals.append((name, data))
 
-    def _receive(self, name: str, data: bytes) -> list[Envelope]:
-        heard_before = self._core.frames_heard(name)
-        outputs = self._core.receive(name, data, self._context.clock.now_ns())
-        if self._core.frames_heard(name) != heard_before:
-            self._keep(name, self._memories[name].keep)
+    def _receive(self, now_ns: int) -> list[Envelope]:
+        """Everything that has arrived; what was heard is on disk before it is told."""
+        for link in self._links.values():
+            link.poll()
+        heard_before = {name: self._core.frames_heard(name) for name in self._links}
+        outputs: list[Envelope] = []
+        while self._arrivals:
+            outputs += self._core.receive(*self._arrivals.popleft(), now_ns)
+        for name, before in heard_before.items():
+            if self._core.frames_heard(name) != before:
+                self._keep(name, self._memories[name].keep)
         return outputs
 
     def _keep(self, name: str, write: Callable[[Memory], None]) -> None:
@@ -106,7 +117,7 @@ class HubPart:
 
     def tick(self, now_ns: int) -> list[Envelope]:
         """Event time goes on; what the nets have to say goes out."""
-        outputs = self._made_up(now_ns)
+        outputs = self._made_up(now_ns) + self._receive(now_ns)
         for name, link in self._links.items():
             self._core.hold(name, busy=link.busy)
         outputs += self._core.tick(now_ns)
@@ -131,6 +142,7 @@ class HubPart:
             "send_faults": sum(link.send_faults for link in self._links.values()),
             "link_garbled": sum(link.garbled for link in self._links.values()),
             "memory_faults": self._memory_faults,
+            "frames_dropped": self._frames_dropped,
         }
         note = figures.note or "; ".join(link.fault for link in self._links.values() if link.fault)
         return replace(

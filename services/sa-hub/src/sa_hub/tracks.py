@@ -20,6 +20,7 @@ _CLOCK_SET_SAMPLES: Final = 3
 _RELAYED_ONLY: Final = 64
 """Frames without the sender's own report after which its old ones tell nothing of its clock any more."""
 _SMOOTHING_S: Final = 0.5
+_NEVER_NS: Final = 1 << 63
 
 
 @dataclass(slots=True)
@@ -48,6 +49,8 @@ class Tracks:
         self._own_ages = own_ages
         self._ages = ages
         self._known: dict[int, Known] = {}
+        self._sorted: list[int] = []
+        self._next_change_ns = _NEVER_NS
 
     def update(self, report: Report, received_ns: int, via: str) -> Known | None:
         """Take a report in; None if the one known is as new."""
@@ -57,6 +60,9 @@ class Tracks:
         fresh = Known(report, received_ns, via)
         fresh.state = self._state(fresh, received_ns)
         self._known[report.number] = fresh
+        if known is None:
+            self._sorted = sorted(self._known)
+        self._next_change_ns = min(self._next_change_ns, self._changes_ns(fresh))
         return fresh
 
     def get(self, number: int) -> Known | None:
@@ -65,21 +71,25 @@ class Tracks:
 
     def all(self) -> list[Known]:
         """Everyone known, by number."""
-        return [self._known[number] for number in sorted(self._known)]
+        return [self._known[number] for number in self._sorted]
 
     def changes(self, now_ns: int) -> Iterator[Known]:
         """Those whose state has changed by ``now_ns``; their new state is set."""
+        if now_ns < self._next_change_ns:
+            return
         for known in self.all():
             state = self._state(known, now_ns)
             if state != known.state:
                 known.state = state
                 yield known
+        self._next_change_ns = min(map(self._changes_ns, self.all()), default=_NEVER_NS)
 
     def own_arrived(self, now_ns: int) -> None:
         """It is ``now_ns``: our own report, whatever its stamp says, came no later than this."""
         own = self._known.get(self._own)
         if own is not None:
             own.received_ns = min(own.received_ns, now_ns)
+            self._next_change_ns = min(self._next_change_ns, self._changes_ns(own))
 
     def set_back(self, by_ns: int) -> None:
         """The clock was set back by so much: everyone is as old as before."""
@@ -87,15 +97,27 @@ class Tracks:
             known.report = replace(known.report, time_ns=known.report.time_ns - by_ns)
             known.received_ns -= by_ns
             known._passed_on = None
+        self._next_change_ns -= by_ns
 
     def _supersedes(self, report: Report, known: Report) -> bool:
         set_back = report.number == self._own and known.time_ns - report.time_ns > CLOCK_SET_BACK_NS
         return report.time_ns > known.time_ns or set_back
 
     def _state(self, known: Known, now_ns: int) -> TrackState:
+        ages, since_ns = self._aging(known)
+        return ages.state(now_ns - since_ns)
+
+    def _changes_ns(self, known: Known) -> int:
+        """When it will be stale, or lost, if nothing is heard meanwhile."""
+        ages, since_ns = self._aging(known)
+        in_ns = {"fresh": ages.stale_ns, "stale": ages.lost_ns}.get(known.state)
+        return _NEVER_NS if in_ns is None else since_ns + in_ns
+
+    def _aging(self, known: Known) -> tuple[Ages, int]:
+        """By what, and since when, a track grows old."""
         if known.report.number == self._own:
-            return self._own_ages.state(now_ns - known.received_ns)
-        return self._ages.state(now_ns - known.report.time_ns)
+            return self._own_ages, known.received_ns
+        return self._ages, known.report.time_ns
 
 
 class SenderClock:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sensor_gateway.intake import Intake
 
 _JOIN_S = 2.0
+_IDLE_BEAT_S = 0.5  # of a gateway that only replays: its main loop has nothing to wait for
 P = ParamSpec("P")
 Value = TypeVar("Value")
 
@@ -75,6 +76,8 @@ class Gateway:
         """Open every source, so that what is wrong is said at once; then let them run."""
         for number, source in enumerate(self._settings.sources):
             self._open(source, f"{source.__struct_config__.tag}{number}")
+        if not self._live:
+            self._context.beat_s = max(self._context.beat_s, _IDLE_BEAT_S)
         self._opened_ns = self._context.clock.now_ns()
         bodies = {opened.name: opened.reader.run for opened in self._live}
         bodies |= {opened.name: opened.reader.run for opened in self._replayed}

@@ -23,9 +23,6 @@ __all__ = ["DEFAULT_START_NS", "Recording", "Replay", "open_recording", "run_mes
 # Where event time begins when nothing says otherwise and no clock runs: 2026-01-01T00:00:00Z.
 DEFAULT_START_NS = 1_767_225_600 * 1_000_000_000
 _LEAD_NS = 500_000_000
-# Messages go out together on this beat of event time: their readers look at the bus no more often, and a wake-up
-# for each would cost more than the message.
-_BEAT_NS = 50_000_000
 _LOOP_PAUSE_NS = 1_000_000_000
 _WAIT_FOR_S = 60.0
 _TLOG, _MCAP = ".tlog", ".mcap"
@@ -96,12 +93,17 @@ def _choose_run(path: Path, name: str | None) -> Run:
 
 
 class Replay:
-    """Opened when it is built; `run` is for a thread of its own."""
+    """Opened when it is built; `run` is for a thread of its own.
+
+    Messages go out together on the services' beat, in event time: their readers look at the bus no more often, and
+    a wake-up for each would cost more than the message.
+    """
 
     def __init__(self, context: Context, settings: ReplaySource) -> None:
         self._context = context
         self._settings = settings
         self._recording = open_recording(context.computer.relative(settings.path), settings, context.identity)
+        self._beat_ns = round(context.options.beat_s * 1e9)
         self._rates = RateMeter()
         self._position_ns = 0
         self._start_ns = 0
@@ -162,7 +164,7 @@ class Replay:
         for envelope in self._recording.messages(start_ns):
             due = due_ns(envelope.message)
             if due > reached_ns:
-                reached_ns = -(-due // _BEAT_NS) * _BEAT_NS
+                reached_ns = -(-due // self._beat_ns) * self._beat_ns
                 if not self._wait_until(reached_ns):
                     return False
             self._context.publish(numbering.renumbered(envelope))

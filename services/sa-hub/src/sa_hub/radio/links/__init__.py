@@ -4,7 +4,11 @@ from typing import Protocol
 
 
 class Link(Protocol):
-    """One way out and in. Frames that arrive are handed to a callback in a thread of the link's own."""
+    """One way out and in. Frames that arrive are handed to a callback: by `poll`, or by a thread of the link's own.
+
+    Where the system keeps what arrives, nobody is woken for it: a picture is as good a tenth of a second later, and
+    on a busy net wake-ups would cost more than all frames.
+    """
 
     name: str
     send_faults: int
@@ -24,6 +28,9 @@ class Link(Protocol):
 
     def start(self) -> None:
         """Begin to receive."""
+
+    def poll(self) -> None:
+        """Hand over what has arrived, if no thread does."""
 
     def send(self, data: bytes) -> None:
         """Send one frame, without waiting; what cannot go is lost and counted, as on the air."""

@@ -5,7 +5,6 @@ Whoever appends to the file is on the net. What stood there before the link bega
 
 import os
 import stat
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
@@ -13,7 +12,6 @@ from typing import Final
 from bootprint.errors import ConfigError
 from sa_hub.radio.link_profile import LinkProfile
 
-_POLL_S: Final = 0.05
 _MAX_READ: Final = 65_536
 _LONGEST_LINE: Final = 200_000
 
@@ -56,12 +54,15 @@ class FileLink:
             folder / (profile.read_path or profile.path), profile.name, os.O_RDWR | os.O_CREAT
         )
         self._rest = b""
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=f"link {profile.name}", daemon=True)
+        self._closed = False
 
     def start(self) -> None:
-        """Begin to follow the file."""
-        self._thread.start()
+        """It follows the file since it was made."""
+
+    def poll(self) -> None:
+        """Hand over what was appended meanwhile."""
+        while self._follow():
+            pass
 
     def send(self, data: bytes) -> None:
         """Append one frame; a full disk or pipe loses it."""
@@ -75,18 +76,11 @@ class FileLink:
 
     def close(self) -> None:
         """Stop following, and close the files."""
-        if self._stop.is_set():
+        if self._closed:
             return
-        self._stop.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        self._closed = True
         os.close(self._reader)
         os.close(self._writer)
-
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            if not self._follow():
-                self._stop.wait(_POLL_S)
 
     def _follow(self) -> bool:
         """Whether there was more to read."""

@@ -60,6 +60,9 @@ class SerialLink:
         """Open the port, now or as soon as it is there."""
         self._thread.start()
 
+    def poll(self) -> None:
+        """Nothing to do: the link's thread hands over what arrives."""
+
     def send(self, data: bytes) -> None:
         """Have one frame wait for its turn; one that finds another waiting, or no port, is lost."""
         if self.fault or self._waiting is not None:

@@ -1,12 +1,10 @@
-"""Frames as UDP datagrams: to any number of peers, unicast, broadcast or multicast; one thread receives."""
+"""Frames as UDP datagrams to any number of peers, unicast or multicast; what comes waits in the socket."""
 
 import contextlib
 import errno
 import ipaddress
-import selectors
 import socket
 import struct
-import threading
 import time
 from collections.abc import Callable
 from typing import Final
@@ -20,6 +18,9 @@ _LONGEST_DATAGRAM: Final = 65_535
 _ANY_PORT: Final = "0.0.0.0:0"
 _ANY_HOST: Final = "0.0.0.0"
 _RETRY_S: Final = 1.0
+_RECEIVE_BUFFER_BYTES: Final = 4_000_000
+"""Asked of the system, which may give less: what comes between two looks at the socket has to fit."""
+_MOST_AT_ONCE: Final = 4096
 _DOWN: Final = {errno.ENETDOWN, errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENODEV, errno.EADDRNOTAVAIL}
 
 Address = tuple[str, int]
@@ -28,7 +29,7 @@ Address = tuple[str, int]
 class UdpLink:
     """One socket, bound when made; ConfigError if the profile's addresses cannot be used.
 
-    ``on_datagram`` is called in the receiving thread. ``send_faults`` counts datagrams the system refused. While
+    ``on_datagram`` is called by `poll`. ``send_faults`` counts datagrams the system refused. While
     none of the peers can be reached (no interface, no route), one frame in a second tries again, and groups are
     joined anew.
     """
@@ -44,8 +45,6 @@ class UdpLink:
         self._groups = _groups(profile)
         self._interface = profile.interface or _ANY_HOST
         self._socket = _open(profile)
-        self._wake, self._woken = socket.socketpair()
-        self._thread = threading.Thread(target=self._run, name=f"link {profile.name}", daemon=True)
 
     @property
     def port(self) -> int:
@@ -54,8 +53,19 @@ class UdpLink:
         return port
 
     def start(self) -> None:
-        """Begin to receive."""
-        self._thread.start()
+        """It receives since it was made."""
+
+    def poll(self) -> None:
+        """Hand over the datagrams that wait in the socket."""
+        for _ in range(_MOST_AT_ONCE):
+            try:
+                data = self._socket.recv(_LONGEST_DATAGRAM)
+            except BlockingIOError:
+                return
+            except OSError as error:  # an ICMP answer to something sent: the next datagram may be fine
+                structlog.get_logger().debug("receive failed", link=self.name, error=str(error))
+                continue
+            self._on_datagram(data)
 
     @property
     def busy(self) -> bool:
@@ -89,30 +99,8 @@ class UdpLink:
                 _join(self._socket, group, self._interface)
 
     def close(self) -> None:
-        """Stop receiving and free the socket."""
-        self._wake.close()
-        if self._thread.is_alive():
-            self._thread.join()
+        """Free the socket."""
         self._socket.close()
-        self._woken.close()
-
-    def _run(self) -> None:
-        with selectors.DefaultSelector() as selector:
-            selector.register(self._socket, selectors.EVENT_READ)
-            selector.register(self._woken, selectors.EVENT_READ)
-            while True:
-                ready = [key.fileobj for key, _ in selector.select()]
-                if self._woken in ready:
-                    return
-                self._receive_one()
-
-    def _receive_one(self) -> None:
-        try:
-            data = self._socket.recv(_LONGEST_DATAGRAM)
-        except OSError as error:  # an ICMP answer to something sent: the next datagram may be fine
-            structlog.get_logger().debug("receive failed", link=self.name, error=str(error))
-            return
-        self._on_datagram(data)
 
 
 def _open(profile: LinkProfile) -> socket.socket:
@@ -121,6 +109,7 @@ def _open(profile: LinkProfile) -> socket.socket:
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         opened.setblocking(False)
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
         opened.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         groups = _groups(profile)
         if groups:

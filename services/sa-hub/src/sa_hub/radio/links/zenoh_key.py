@@ -49,6 +49,9 @@ class ZenohLink:
         """Look for the router until it is there."""
         self._thread.start()
 
+    def poll(self) -> None:
+        """Nothing to do: the link's thread hands over what arrives."""
+
     def send(self, data: bytes) -> None:
         """Put one frame on the net's key."""
         try:

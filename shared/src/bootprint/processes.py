@@ -1,4 +1,4 @@
-"""Real operating-system processes of an exercise: started with a line to their parent, stopped without remains.
+"""Operating-system processes that belong to this one: started with a line to their parent, stopped without remains.
 
 Every child runs with ``--stop-on-eof`` and a pipe on its standard input: when the parent dies, however it dies,
 the pipe closes and the child ends. A normal stop closes the pipes, waits, then terminates, then kills.
@@ -9,9 +9,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Collection
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
+from typing import BinaryIO
 
 from bootprint.errors import BootprintError
 
@@ -19,33 +21,37 @@ _GRACE_S = 6.0
 
 
 class ProcessError(BootprintError):
-    """A process of the exercise could not be started or ended early."""
+    """A process could not be started or ended early."""
 
 
 @dataclass(frozen=True)
 class ProcessSpec:
-    """A service to run: the command (a console script of this installation), its arguments and its log file."""
+    """A service to run: the command (a console script of this installation), its arguments and its log file.
+
+    Without ``log`` it writes where its parent does; ``append`` keeps what the file holds from earlier lives.
+    """
 
     name: str
     command: str
     arguments: tuple[str, ...]
-    log: Path
+    log: Path | None
+    append: bool = False
 
 
 class ProcessGroup:
-    """The processes of one exercise; a context manager that leaves none behind."""
+    """Processes of one parent; a context manager that leaves none behind."""
 
     def __init__(self) -> None:
         self._running: dict[str, tuple[ProcessSpec, subprocess.Popen[bytes]]] = {}
 
     def start(self, spec: ProcessSpec) -> None:
         """Start one process; ProcessError if its command is not installed."""
-        with spec.log.open("wb") as log:
+        with _opened(spec) as log:
             process = subprocess.Popen(
                 [_find(spec.command), *spec.arguments, "--stop-on-eof"],
                 stdin=subprocess.PIPE,
                 stdout=log,
-                stderr=subprocess.STDOUT,
+                stderr=log,
                 start_new_session=True,  # Ctrl-C reaches the parent, which then stops its children in order
             )
         self._running[spec.name] = (spec, process)
@@ -58,10 +64,20 @@ class ProcessGroup:
     def failed(self) -> list[str]:
         """One line for each process that ended with an error: its name, exit code and last words."""
         return [
-            f"{name} {_end_of(process.returncode)}; its last words in {spec.log}: {_last_line(spec.log)}"
+            f"{name} {end_of(process.returncode)}{_last_words(spec)}"
             for name, (spec, process) in self._running.items()
             if process.poll() not in (None, 0)
         ]
+
+    def reap(self) -> dict[str, int]:
+        """Those that have ended, with their exit codes; they are no longer of the group."""
+        codes = {name: process.poll() for name, (_, process) in self._running.items()}
+        ended = {name: code for name, code in codes.items() if code is not None}
+        for name in ended:
+            _, process = self._running.pop(name)
+            if process.stdin:
+                process.stdin.close()
+        return ended
 
     def check(self) -> None:
         """ProcessError if any process has ended with an error."""
@@ -114,7 +130,8 @@ def _all_ended(processes: list[subprocess.Popen[bytes]], within_s: float) -> boo
     return True
 
 
-def _end_of(code: int) -> str:
+def end_of(code: int) -> str:
+    """How a process with this exit code ended, in words."""
     return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
 
 
@@ -126,6 +143,12 @@ def _find(command: str) -> str:
     return found
 
 
-def _last_line(log: Path) -> str:
-    lines = log.read_text(errors="replace").strip().splitlines()
-    return lines[-1] if lines else "(no output)"
+def _opened(spec: ProcessSpec) -> AbstractContextManager[BinaryIO | None]:
+    return nullcontext() if spec.log is None else spec.log.open("ab" if spec.append else "wb")
+
+
+def _last_words(spec: ProcessSpec) -> str:
+    if spec.log is None:
+        return ""
+    lines = spec.log.read_text(errors="replace").strip().splitlines()
+    return f"; its last words in {spec.log}: {lines[-1] if lines else '(no output)'}"

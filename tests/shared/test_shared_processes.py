@@ -11,7 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from proving_ground.exercises.processes import ProcessError, ProcessGroup, ProcessSpec
+from bootprint.processes import ProcessError, ProcessGroup, ProcessSpec
 from proving_ground.exercises.stage import free_ports
 from support.routers import free_endpoint
 from support.waiting import wait_until
@@ -61,7 +61,7 @@ def test_a_killed_parent_leaves_no_child(tmp_path: Path) -> None:
         import sys, threading
         from pathlib import Path
         sys.path.insert(0, {str(Path(__file__).parents[1])!r})
-        from proving_ground.exercises.processes import ProcessGroup, ProcessSpec
+        from bootprint.processes import ProcessGroup, ProcessSpec
         from support.routers import free_endpoint
         group = ProcessGroup()
         log = Path({str(tmp_path / "child.log")!r})
@@ -78,14 +78,3 @@ def test_a_killed_parent_leaves_no_child(tmp_path: Path) -> None:
     parent.wait()
     parent.stdout.close()
     wait_until(lambda: not is_running(child), what="the child has ended")
-
-
-@pytest.mark.parametrize("kind", [socket.SOCK_STREAM, socket.SOCK_DGRAM])
-def test_free_ports_are_none_that_the_system_would_give_to_the_next_who_asks(kind: socket.SocketKind) -> None:
-    ports = free_ports(200, kind)
-    assert len(set(ports)) == 200
-    assert min(ports) > 1024
-    assert max(ports) < 32_768
-    with socket.socket(socket.AF_INET, kind) as taken:
-        taken.bind(("127.0.0.1", ports[0]))
-        assert ports[0] not in free_ports(22_000, kind)
