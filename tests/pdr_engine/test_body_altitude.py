@@ -5,6 +5,7 @@ import pytest
 
 from pdr_engine.body.altitude.altimeter import LAG_S, Altimeter, pressure_height_m
 from pdr_engine.body.altitude.floors import FloorCounter
+from pdr_engine.body.altitude.vertical import VerticalChannel
 
 PA_PER_M = 12.0  # near the ground; the standard atmosphere has 12.01 at sea level
 STEP_S = 0.5
@@ -44,18 +45,18 @@ def test_weather_is_no_height() -> None:
     altimeter = Probe()
     walk(altimeter, [(600.0, 0.0, True)], drift_pa_s=0.06)
     assert abs(altimeter.height_m) < 0.3
-    assert altimeter.climbing.way == "level"
+    assert altimeter.way == "level"
 
 
 @pytest.mark.parametrize(("sign", "riser"), [(1.0, 0.16), (-1.0, 0.16), (1.0, 0.185)])
 def test_stairs_are_climbed_by_risers(sign: float, riser: float) -> None:
     altimeter = Probe()
     walk(altimeter, [(20.0, 0.0, True), (23.0, sign * riser / STEP_S, True)])
-    assert altimeter.climbing.way == "stairs"
-    assert altimeter.climb.stairs > 0.9
-    assert altimeter.climb.up == (sign > 0.0)
+    assert altimeter.way == "stairs"
+    assert altimeter.climb(None).stairs > 0.9
+    assert altimeter.climb(None).up == (sign > 0.0)
     walk(altimeter, [(10.0, 0.0, True)])
-    assert altimeter.climbing.way == "level"
+    assert altimeter.way == "level"
     assert altimeter.height_m == pytest.approx(sign * 46 * riser, abs=0.35)
     assert altimeter.riser_m == pytest.approx(riser, abs=0.008)
 
@@ -63,8 +64,8 @@ def test_stairs_are_climbed_by_risers(sign: float, riser: float) -> None:
 def test_a_lift_has_height_without_steps() -> None:
     altimeter = Probe()
     walk(altimeter, [(20.0, 0.0, True), (5.0, 0.0, False), (9.0, 1.0, False)])
-    assert altimeter.climbing.way == "lift"
-    assert altimeter.climb.stairs < 0.05
+    assert altimeter.way == "lift"
+    assert altimeter.climb(None).stairs < 0.05
     assert altimeter.height_m == pytest.approx(altimeter.test_height_m, abs=0.8)  # now: no lag
     walk(altimeter, [(5.0, 0.0, False), (10.0, 0.0, True)])
     assert altimeter.height_m == pytest.approx(9.0, abs=0.3)
@@ -73,8 +74,8 @@ def test_a_lift_has_height_without_steps() -> None:
 def test_a_slope_is_no_stairs() -> None:
     altimeter = Probe()
     walk(altimeter, [(20.0, 0.0, True), (40.0, 0.12, True)])  # 6 cm a step
-    assert altimeter.climbing.way == "slope"
-    assert altimeter.climb.stairs < 0.05
+    assert altimeter.way == "slope"
+    assert altimeter.climb(None).stairs < 0.05
     walk(altimeter, [(10.0, 0.0, True)])
     assert altimeter.height_m == pytest.approx(4.8, abs=0.6)
 
@@ -104,6 +105,10 @@ def test_nonsense_is_left_out_and_gaps_make_unsure() -> None:
     assert altimeter.height_m == pytest.approx(6.0, abs=1.0)
 
 
+def counter(start_floor: int = 0, storey_m: float = 3.6, storey_sigma_m: float = 0.9) -> FloorCounter:
+    return FloorCounter(start_floor, storey_m, storey_sigma_m)
+
+
 def stay(floors: FloorCounter, at_s: float, height_m: float, seconds: float = 20.0) -> float:
     """Stay at a height, and be on stairs for a moment; the time after that."""
     for time_s in np.arange(at_s, at_s + seconds, 0.5):
@@ -113,7 +118,7 @@ def stay(floors: FloorCounter, at_s: float, height_m: float, seconds: float = 20
 
 
 def test_floors_of_unequal_storeys_are_known_again() -> None:
-    floors, found, at_s = FloorCounter(), [], 0.0
+    floors, found, at_s = counter(), [], 0.0
     for height in (0.0, 5.2, 8.4, 11.7, 8.3, 0.3, 5.0, -3.1):
         at_s = stay(floors, at_s, height)
         found.append(floors.floor)
@@ -122,7 +127,7 @@ def test_floors_of_unequal_storeys_are_known_again() -> None:
 
 
 def test_a_ramp_or_a_landing_is_no_floor() -> None:
-    floors = FloorCounter(start_floor=2)
+    floors = counter(start_floor=2)
     at_s = stay(floors, 0.0, 0.0)
     at_s = stay(floors, at_s, 3.4)
     at_s = stay(floors, at_s, 5.0)
@@ -132,7 +137,7 @@ def test_a_ramp_or_a_landing_is_no_floor() -> None:
 
 
 def test_several_storeys_at_once_are_counted_by_the_known_height() -> None:
-    floors = FloorCounter(storey_m=2.6, storey_sigma_m=0.2)
+    floors = counter(storey_m=2.6, storey_sigma_m=0.2)
     at_s = stay(floors, 0.0, 0.0)
     stay(floors, at_s, 7.8)
     assert floors.floor == 3
@@ -146,3 +151,53 @@ def test_a_lag_is_all_there_is_between_settled_and_now() -> None:
     walk(altimeter, [(20.0, 0.0, True), (5.0, 0.0, False), (8.0, 1.0, False)])
     behind = altimeter.test_height_m - altimeter.settled_height_m
     assert behind == pytest.approx(LAG_S * 1.0, abs=0.8)
+
+
+def test_a_floor_is_known_on_arrival_and_in_between_the_last_stays() -> None:
+    floors = counter()
+    at_s = stay(floors, 0.0, 0.0)
+    at_s = stay(floors, at_s, 3.6)
+    stay(floors, at_s, 7.2)
+    assert floors.at(3.5)[0] == 1
+    assert floors.at(0.2)[0] == 0
+    assert min(floors.at(height)[1] for height in (0.0, 3.6, 7.2)) > 0.9
+    floor, probability = floors.at(5.4)  # amid the stairs
+    assert floor in (1, 2)
+    assert probability < 0.5
+
+
+def climb_seen(
+    channel: VerticalChannel, bias_m_s2: float, at_s: np.ndarray, height_m: np.ndarray
+) -> np.ndarray:
+    """Heights that the channel says: exact pressure at 10 Hz, exact acceleration and a bias at 50 Hz."""
+    acceleration = np.gradient(np.gradient(height_m, at_s), at_s)
+    told = []
+    for k, time_s in enumerate(at_s):
+        channel.accelerate(round(time_s * S), 9.80665 + bias_m_s2 + float(acceleration[k]))
+        if k % 5 == 0:
+            channel.hold(round(time_s * S), float(height_m[k]))
+        told.append(channel.height_m)
+    return np.array(told, dtype=np.float64)
+
+
+def test_the_channel_learns_a_bias_and_follows_a_climb_without_lag() -> None:
+    at_s = np.arange(0.0, 60.0, 0.02)
+    height = np.where(at_s > 40.0, 0.33 * (at_s - 40.0), 0.0)
+    window = np.hanning(51) / np.hanning(51).sum()
+    at_s, height = at_s[25:-25], np.convolve(height, window, "valid")
+    channel = VerticalChannel()
+    told = climb_seen(channel, 0.1, at_s, height)
+    assert float(np.abs(told - height)[at_s > 35.0].max()) < 0.03
+    assert channel.bias_m_s2 == pytest.approx(0.1, abs=0.02)
+    assert channel.velocity_m_s == pytest.approx(0.33, abs=0.05)
+
+
+def test_stairs_are_told_by_the_channel_before_the_tick_is_over() -> None:
+    """The belief a tick on from the level, by a height that is a riser and a half above it."""
+    altimeter = Probe()
+    walk(altimeter, [(20.0, 0.0, True)], noise_pa=0.1)
+    level = altimeter.settled_height_m
+    assert abs(level) < 0.1
+    assert altimeter.climb(None).stairs < 0.05
+    told = [altimeter.climb(pressure_height_m(101_325.0) + rise).stairs for rise in (0.0, 0.17)]
+    assert told[1] > 10.0 * told[0]

@@ -119,3 +119,25 @@ def test_a_break_begins_a_new_cell() -> None:
     assert not list(grid.add(10 * CELL_NS, (5.0,)))
     (cell,) = grid.add(11 * CELL_NS, (5.0,))
     assert cell == (10 * CELL_NS, (5.0,))
+
+
+def test_levelling_does_not_leak_into_the_bias_about_the_vertical() -> None:
+    """A trunk that rolls by 0.1 rad in step with a surge of 2 m/s²: pull times roll is 0.1 m/s² about z on average,
+    which in 200 s would make 0.25 · 0.1² / G · 0.1 · 200 s = 0.005 rad/s."""
+    attitude = Attitude(AttitudeSettings())
+    feed(attitude, 2.0)
+    omega, roll_rad, surge_m_s2 = 2.0 * math.pi, 0.1, 2.0
+    for k in range(20_000):
+        swing = math.sin(omega * 0.01 * k)
+        up = (0.0, math.sin(roll_rad * swing), math.cos(roll_rad * swing))
+        rate = roll_rad * omega * math.cos(omega * 0.01 * k)
+        accel = (surge_m_s2 * swing, G * up[1], G * up[2])
+        attitude.follow(Sample(0, 0.01, accel, (rate, 0.0, 0.0), None, False))
+    assert abs(attitude.bias_rad_s[2]) < 5e-4
+
+
+def test_what_rests_take_off_about_the_vertical_is_told() -> None:
+    attitude = Attitude(AttitudeSettings())
+    feed(attitude, 60.0, gyro=(0.0, 0.0, 0.01))
+    assert attitude.rest_turn_rad_s == pytest.approx(0.01, rel=0.02)
+    assert attitude.rest_turn_rad_s == pytest.approx(attitude.bias_rad_s[2], rel=1e-3)

@@ -1,6 +1,7 @@
 """Movement classes: from trunks that move as the sources say, not as the simulator does."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -174,18 +175,30 @@ def test_the_next_steps_carry_what_the_first_was_wrong_by() -> None:
 
 
 def test_a_unit_fixed_to_the_trunk_tells_a_crawl_and_one_in_the_hand_does_not() -> None:
-    """Upright for 30 steps, leaning 8° more, then level: the usual vertical follows the lean and not the crawl."""
-    fixed, loose = Posture(fixed=True), Posture(fixed=False)
+    """Upright at first, then leaning 8° more, then level: the usual vertical follows the lean and not the crawl."""
+    fixed, loose = Posture(), Posture()
     for _ in range(60):
-        leaning = fixed.tilt_rad(rows_leaning(8.0))
+        leaning = fixed.tilt_rad(rows_leaning(8.0), on_trunk=True)
     assert leaning == pytest.approx(0.0, abs=1e-3)
     for _ in range(100):
-        level = fixed.tilt_rad(rows_leaning(83.0))
+        level = fixed.tilt_rad(rows_leaning(83.0), on_trunk=True)
     assert level == pytest.approx(math.radians(75.0), abs=1e-3)
-    assert fixed.tilt_rad(rows_leaning(8.0)) == pytest.approx(0.0, abs=1e-3)
-    assert loose.tilt_rad(rows_leaning(83.0)) is None
+    assert fixed.tilt_rad(rows_leaning(8.0), on_trunk=True) == pytest.approx(0.0, abs=1e-3)
+    assert loose.tilt_rad(rows_leaning(83.0), on_trunk=False) is None
 
 
 def rows_leaning(degrees: float) -> Rows:
     s, c = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
     return ((c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c))
+
+
+def test_a_twist_that_shakes_the_unit_to_and_fro_turns_no_direction() -> None:
+    """Side steps to the right with a left shove at every second step: one by one they point anywhere."""
+    directions = DirectionFilter()
+    for number in range(12):
+        shove = 0.8 if number % 2 else -0.8
+        stride = pendulum(-0.5 * math.pi, number, hz=2.0)
+        surge = surge_of(stride)
+        shoved = replace(surge, left_m_s2=surge.left_m_s2 + shove)
+        directions.update(shoved, 0.0, stride.start_ns, stride.end_ns)
+        assert number < 2 or directions.decided == "right"

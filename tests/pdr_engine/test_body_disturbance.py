@@ -115,3 +115,13 @@ def test_doubt_widens_an_azimuth_until_it_is_worthless() -> None:
     assert sure == pytest.approx(0.1)
     assert half == pytest.approx(0.5)
     assert bad is None
+
+
+def test_unevenness_is_what_the_field_is_off_its_habit() -> None:
+    """Begun as in a building; even it is none, and with strengths 10 % up and down 0.1."""
+    even, uneven = DisturbanceDetector(EARTH, 0.14), DisturbanceDetector(EARTH, 0.14)
+    assert even.unevenness == pytest.approx(0.14)
+    walked(even, [clean()] * 400)
+    walked(uneven, [clean(strength=STRENGTH * (1.1 if k % 2 else 0.9)) for k in range(400)])
+    assert even.unevenness < 0.02
+    assert uneven.unevenness == pytest.approx(0.1, abs=0.02)

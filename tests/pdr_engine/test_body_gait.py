@@ -25,6 +25,7 @@ from pdr_engine.body.settings import LengthSettings, StepSettings
 from pdr_engine.body.steps.footfalls import Footfalls
 from pdr_engine.body.steps.gait import Gait, gait_of
 from pdr_engine.body.steps.grid import CELL_NS, CELL_S
+from pdr_engine.body.steps.rhythm import unevenness
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 SETTINGS = LengthSettings()
@@ -228,3 +229,54 @@ def test_the_network_never_runs_away() -> None:
     assert network(gait_with(1.9, 0.06), SETTINGS, 1.0, False) == pytest.approx(0.66, abs=0.06)
     fast, slow = gait_with(2.2, 0.06), gait_with(1.5, 0.03)
     assert network(fast, SETTINGS, 1.0, False) > network(slow, SETTINGS, 1.0, False) + 0.05
+
+
+def test_small_bumps_between_steps_are_none_even_at_the_start() -> None:
+    """Steps half a second apart, each with a knock 0.24 s later: nobody walks four steps a second."""
+    time_s = np.arange(0.0, 20.0, CELL_S)
+    since = np.mod(time_s, 0.5)
+    vertical = sum(6.0 * np.exp(-0.5 * ((since - at) / 0.035) ** 2) for at in (0.1, 0.34))
+    assert abs(len(steps_in(np.asarray(vertical))) - 40) <= 1
+
+
+def test_a_runner_whose_feet_strike_unlike_is_counted_by_steps() -> None:
+    """After a slow walk: 2.9 steps a second, every second one a third softer."""
+    slow = sine(1.4, 2.0, 6.0)
+    time_s = np.arange(0.0, 12.0, CELL_S)
+    run = (12.0 + 2.4 * np.sign(np.sin(np.pi * 2.9 * time_s))) * np.sin(2.0 * np.pi * 2.9 * time_s)
+    steps = steps_in(np.concatenate([slow, run]))
+    assert abs(len(steps) - (6.0 * 1.4 + 12.0 * 2.9)) <= 3.0
+
+
+def test_a_ride_is_told_from_a_walk_by_its_rhythm() -> None:
+    """Bounces as often as steps, whose intervals and heights are anything; then a walk, which is believed."""
+    rng = np.random.default_rng(5)
+    ride = np.concatenate(
+        [sine(1.0 / wait, rng.uniform(1.5, 6.0), wait) for wait in rng.uniform(0.35, 1.4, 300)]
+    )
+    assert len(steps_in(ride)) < 0.5 * 300
+    walk = sine(1.8, 4.0, 60.0)
+    found = [end for _, end in steps_in(np.concatenate([ride, walk])) if end > len(ride) * CELL_NS]
+    assert abs(len(found) - 108) <= 3
+
+
+def test_strides_are_even_though_left_and_right_differ() -> None:
+    assert unevenness([0.34, 0.66] * 6) == pytest.approx(0.0)
+    assert unevenness([0.5, 0.5, 0.6, 0.6]) == pytest.approx(0.1 / 0.55)
+    assert unevenness([0.5]) == 0.0
+
+
+def test_a_unit_is_surely_on_the_trunk_after_many_hard_steps_only() -> None:
+    told, auto = Placement(LengthSettings(placement="trunk")), Placement(SETTINGS)
+    hard = Gait(0.5, 0.04, 2.0 * 1.8 * 0.02 * (4.0 * math.pi) ** 2, 4.0, (1.0, 0.0), 0.75)
+    soft = Gait(0.5, 0.04, 2.0 * 1.1 * 0.02 * (4.0 * math.pi) ** 2, 4.0, (1.0, 0.0), 0.25)
+    assert told.on_trunk
+    for _ in range(10):
+        auto.learn(hard)
+    assert not auto.on_trunk
+    for _ in range(90):
+        auto.learn(hard)
+    assert auto.on_trunk
+    for _ in range(200):
+        auto.learn(soft)
+    assert not auto.on_trunk

@@ -79,3 +79,30 @@ def test_the_engine_hears_fixes_and_pressure_for_the_body() -> None:
     pressure = Pressure(time_ns=0, pressure_pa=101_325.0)
     assert list(core.handle(Envelope(me.address("pressure", "body"), pressure))) == []
     assert core.figures().counters["other_places"] == 0
+
+
+def test_fixes_refine_the_weights_of_a_gait_and_leave_another_alone() -> None:
+    """Steps of two gaits, whose features are +1 and -1; only the first are 6 % longer than told."""
+    scale = PersonalScale(refinement=(0.0,))
+    east = 0.0
+    for second in range(1200):
+        is_long = second // 60 % 2 == 0
+        scale.fix(second * SECOND_NS, east, 0.0, 2.0)
+        scale.meet([1.0 if is_long else -1.0])
+        scale.walk(1.4 * scale.factor, 0.5)
+        east += 1.4 * (1.06 if is_long else 1.0)
+    scale.meet([1.0])
+    assert scale.factor == pytest.approx(1.06, abs=0.015)
+    scale.meet([-1.0])
+    assert scale.factor == pytest.approx(1.0, abs=0.015)
+    again = PersonalScale(scale.person.scale, scale.person.sigma, scale.person.refinement)
+    again.meet([-1.0])
+    assert again.factor == pytest.approx(scale.factor)
+
+
+def test_no_feature_makes_a_refined_factor_run_away() -> None:
+    scale = PersonalScale(refinement=(0.9, -0.9))
+    scale.meet([1e6, 0.0])
+    assert math.log(scale.factor) == pytest.approx(MOST_LOG)
+    scale.meet([0.0, 1e6])
+    assert math.log(scale.factor) == pytest.approx(-MOST_LOG)

@@ -9,7 +9,8 @@ from bootprint.config import Origin
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import GnssFix, ImuBatch
 from bootprint.topics import Identity
-from pdr_engine.body import BodySettings
+from pdr_engine.body import BodyNavigator, BodySettings
+from pdr_engine.body.azimuth.deviation import Deviation
 from pdr_engine.config import PdrConfig
 from pdr_engine.engine import EngineCore
 from pdr_engine.profile import (
@@ -35,6 +36,23 @@ def test_a_profile_comes_back_and_sets_the_beginning(tmp_path: Path) -> None:
     assert profile is not None
     length = with_profile(BodySettings(), profile).length
     assert (length.scale, length.common_sigma_share) == (1.07, 0.03)
+
+
+def test_weights_and_deviations_come_back_too(tmp_path: Path) -> None:
+    path = tmp_path / "body-profile.json"
+    known = BodyProfile(
+        scale=1.0,
+        scale_sigma=0.03,
+        refinement=(0.02, -0.01, 0.0, 0.04),
+        deviations=(Deviation(3, -2, 0.5, 7.9, 8),),
+    )
+    save_profile(path, known)
+    profile = load_profile(path)
+    assert profile is not None
+    settings = with_profile(BodySettings(step_length="network", deviation_map=True), profile)
+    navigator = BodyNavigator(settings)
+    assert navigator.person.refinement == pytest.approx(known.refinement)
+    assert navigator.deviations == known.deviations
 
 
 @pytest.mark.parametrize("damage", [b"", b"{", b'{"scale": 40, "scale_sigma": 0.1}', b'{"scale": 1}'])

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from pdr_engine.body.track.cross_check import CrossCheck
 from pdr_engine.body.track.reliability import (
     ExternalReliability,
     agreed,
@@ -85,3 +86,13 @@ def test_two_that_contradict_both_stay_and_make_unsure() -> None:
     single = agreed({"gnss": (20.0, 3.0)})
     assert single is not None
     assert (single.value, single.sigma) == (20.0, 3.0)
+
+
+def test_a_compass_that_gyro_and_satellites_contradict_is_rejected_and_counted() -> None:
+    check = CrossCheck()
+    assert check.step((0.3, 0.1), (0.32, 0.1), (0.28, 0.1)) == ()
+    # A quarter turn: the satellites' stretch lies before it, and the gyro carries it on.
+    assert check.step((0.3 + 1.57, 0.1), (0.32 + 1.57, 0.1), (0.28, 0.1)) == ()
+    assert check.step((1.0, 0.1), (0.32 + 1.57, 0.1), (0.28, 0.1)) == ("compass",)
+    assert check.rejected == {"compass": 1, "gyro": 0, "gnss": 0}
+    assert check.step((1.0, 0.1), (0.32 + 1.57, 0.1), None) == ()  # of two nobody knows who errs

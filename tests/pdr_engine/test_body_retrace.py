@@ -125,3 +125,23 @@ def test_published_steps_add_up_to_the_places() -> None:
         total += length * np.array([math.sin(led), math.cos(led)])
     assert places.retrace.left == 1
     assert total == pytest.approx(end, abs=1e-6)
+
+
+def test_what_is_learned_of_step_length_does_not_make_the_way_back_longer() -> None:
+    """On the way out steps are told 10 % too short; on the way back it is known that they are not."""
+    retrace = Retrace()
+    for _ in range(300):
+        retrace.step(0.9 * LEG_M, 0.0, 0.9)
+    for _ in range(300):
+        retrace.step(LEG_M, math.pi, 1.0)
+    assert np.hypot(*retrace.place_m) < 0.5 * LEG_M
+
+
+def test_instruments_that_differ_slowly_are_no_other_way() -> None:
+    """15° within 150 m, as iron on the person makes a compass differ out and back."""
+    walker = Walker(noise_deg=3.0)
+    walker.go([0.0] * 500)
+    walker.go([180.0 + min(15.0, 0.07 * step) for step in range(480)])
+    assert walker.retrace.left == 0
+    assert walker.retrace.active
+    assert walker.retrace.place_m[1] == pytest.approx(20 * LEG_M, abs=2.0)

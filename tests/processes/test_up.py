@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 import psutil
@@ -76,8 +76,9 @@ def doctor(computer: Path) -> tuple[int, dict[str, str]]:
 
 def child(up: subprocess.Popen[bytes], name: str) -> psutil.Process | None:
     for process in psutil.Process(up.pid).children():
-        if any(part.endswith(f"/{name}") for part in process.cmdline()[:3]):
-            return process
+        with suppress(psutil.Error):  # one that has just ended
+            if any(part.endswith(f"/{name}") for part in process.cmdline()[:3]):
+                return process
     return None
 
 

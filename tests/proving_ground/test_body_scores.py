@@ -1,20 +1,22 @@
-"""The body module's parts on simulated walks: heights, azimuths past iron, steps with GPS. Small, but real."""
+"""The body module on simulated walks: heights, azimuths past iron, steps with GPS. Small, but real."""
 
 import numpy as np
 
 from proving_ground.evaluation.body_azimuth import simulated
-from proving_ground.evaluation.body_heights import STAIRS_M, apart_pct, run_building
+from proving_ground.evaluation.body_heights import run_building, told_pct
 from proving_ground.evaluation.body_pns_gps import town
 
 
-def test_a_building_s_heights_and_floors() -> None:
-    scores = [run_building("mall", "industrial", seed) for seed in (1, 3)]
-    errors = np.concatenate([score.stairs_error_m for score in scores])
-    assert len(errors) == 6  # up, down, up
-    assert float(np.median(errors)) < 0.4 < 0.1 * STAIRS_M
-    assert apart_pct(scores, "lift", ("stairs",)) > 95.0
-    assert apart_pct(scores, "slope", ("stairs",)) > 95.0
-    assert sum(score.floors_right for score in scores) >= sum(score.floors for score in scores) - 1
+def test_a_building_s_heights_and_floors_through_the_whole_chain() -> None:
+    score = run_building("office", "industrial", "belt", seed=1)
+    assert len(score.stairs_error_m) == 4  # two storeys, both at once, and down again
+    assert max(score.stairs_error_m) < 0.6
+    assert len(score.lift_error_m) == 1
+    assert score.lift_error_m[0] < 0.5
+    assert told_pct([score], "slope", stairs=False) > 95.0
+    assert told_pct([score], "stairs", stairs=True) > 80.0
+    assert all(score.stays)
+    assert np.mean(score.floors) > 0.95
 
 
 def test_a_bridge_has_a_third_of_the_compass_s_error_past_iron() -> None:

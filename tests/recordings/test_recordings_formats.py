@@ -247,6 +247,7 @@ def test_run_folder_notes_are_strict(tmp_path: Path, notes: str, complaint: str)
         ("left_foot.csv", f"{IMU_HEADER}\n0,1,2,3,4,5,6\n1,2\n", "line 3 has 2 cells"),
         ("left_foot.csv", f"{IMU_HEADER}\n", "no data"),
         ("truth.csv", "time_s,east_m,north_m\n1,0,0\n0,1,1\n", "must rise"),
+        ("pressure.csv", "time_s,pressure_pa\n0,1013\n1,1012\n", "must be Pa, not hPa"),
     ],
 )
 def test_damaged_tables_are_told_in_one_line(tmp_path: Path, file: str, content: str, complaint: str) -> None:

@@ -139,7 +139,7 @@ const nearest = (low, modulus, degrees, cell) =>
 
 // What the entries of an update mean to who has heard what the sender told before; the others are left out.
 function updated(update, entries, sender, told) {
-  const row = CELL_DEG * 2 ** named("cells", update), modulus = 2 ** named("reach", update);
+  const row = CELL_DEG * 2 ** named("cells", update), reach = named("reach", update);
   const column = row * 2 ** Math.round(-Math.log2(cosine(vectors.origin.latitude_deg)));
   const now_s = time(update.time, 0, 256);
   let number = update.own ? sender : update.near ? sender + update.beside - 8 : update.first;
@@ -149,8 +149,9 @@ function updated(update, entries, sender, told) {
     if (!before) return [];
     const [latitude, longitude] =
       moved(before.latitude_deg, before.longitude_deg, before.east_m_s, before.north_m_s, now_s - before.time_s);
+    const modulus = 2 ** (reach + (update.varied ? (entry.far ? 2 : -1) : 0));
     const place = [nearest(entry.north, modulus, latitude, row), around(nearest(entry.east, modulus, longitude, column), 360)];
-    const [east_m_s, north_m_s] = velocity(entry), age_s = ageTicks(entry.age ?? 0) / 10;
+    const [east_m_s, north_m_s] = entry.steady ? [before.east_m_s, before.north_m_s] : velocity(entry), age_s = ageTicks(entry.age ?? 0) / 10;
     const [latitude_deg, longitude_deg] = moved(...place, -east_m_s, -north_m_s, age_s);
     const known = before.height_m !== null && entry.has_height;
     return [{

@@ -43,11 +43,14 @@ def test_a_relay_is_known_to_know_whom_it_passes_on() -> None:
     assert all(START_NS <= since <= START_NS + 5 * S for since in of(contacts, "lead").knows.values())
 
 
-def test_a_soldier_proves_to_know_itself_and_no_more() -> None:
+def test_a_soldier_proves_to_know_itself_and_what_it_says_to_have_heard_of_us() -> None:
     air = company()
     air.run(41.0, WALKS)
     contacts = newest(air, "a1")
-    assert {each.soldier: set(each.knows) for each in contacts.members} == {"a2": {"a2"}, "a3": {"a3"}}
+    assert {each.soldier: set(each.knows) for each in contacts.members} == {
+        "a2": {"a1", "a2"},
+        "a3": {"a1", "a3"},
+    }
     assert set(contacts.knows) == {"a2", "a3"}
 
 

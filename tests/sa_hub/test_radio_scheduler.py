@@ -19,7 +19,8 @@ from sa_hub.radio.persistence import Persistence
 from sa_hub.radio.picture import Spoken
 from sa_hub.radio.relevance import LEADER, NEAR_OTHERS, NEAR_SEEN, Relevance
 from sa_hub.radio.replay import Heard
-from sa_hub.radio.scheduler import Policy, Room, Scheduler
+from sa_hub.radio.room import Room
+from sa_hub.radio.scheduler import Policy, Scheduler
 from sa_hub.radio.seal import NetKeys, Opener, Sealer
 from sa_hub.settings import LinkProfile
 from support.hub_squad import GROUP_KEY, ORIGIN, START_NS, S
@@ -278,15 +279,57 @@ def test_a_listener_that_has_long_been_silent_is_dropped() -> None:
 
 def test_feedback_goes_to_who_was_missed_and_costs_nothing_otherwise() -> None:
     hearing = Hearing()
-    hearing.heard_update(5, epoch=1, counter=10, soldiers=[7])
-    assert hearing.due({5: Heard(1, 20, mask=0b111_1111_1111)}.get) is None
-    feedback = hearing.due({5: Heard(1, 20, mask=0b111_1110_0111)}.get)
-    assert feedback == Feedback(5, 20, 12, 0b0011_1111_0011)
-    hearing.heard_update(6, epoch=1, counter=15, soldiers=[8, 9, 10])
+    hearing.heard_telling(5, epoch=1, counter=10, soldiers=[7])
+    first = hearing.due({5: Heard(1, 19, mask=0b11_1111_1111)}.get, 1)
+    assert first == Feedback(5, 19, 32, 0b1_1111_1111)
+    feedback = hearing.due({5: Heard(1, 20, mask=0b111_1110_0111)}.get, 1)
+    # The first goes back as far as feedback can, to what was told in full before the first update.
+    assert feedback == Feedback(5, 20, 32, 0b0011_1111_0011)
+    hearing.heard_telling(6, epoch=1, counter=15, soldiers=[8, 9, 10])
     memory = {5: Heard(1, 20, mask=0b111_1110_0111), 6: Heard(1, 20, mask=0b10_0001)}
-    other = hearing.due(memory.get)
+    other = hearing.due(memory.get, 1)
     assert other is not None
     assert other.about == 6  # fewer frames, but of more soldiers
     hearing.sent(feedback)
-    assert hearing.due({5: Heard(1, 20, mask=0b111_1110_0111)}.get) is None
-    assert hearing.due(lambda _sender: None) is None
+    assert hearing.due({5: Heard(1, 20, mask=0b111_1110_0111)}.get, 1) is None
+    assert hearing.due(lambda _sender: None, 1) is None
+    feedback = hearing.due({5: Heard(1, 24, mask=0b111_1110_0111_0111)}.get, 1)
+    assert feedback is not None
+    assert feedback.span == 16  # from the one before the last on
+
+
+def test_who_tells_of_many_spends_nothing_on_who_tells_of_few() -> None:
+    hearing = Hearing()
+    hearing.heard_telling(5, epoch=1, counter=10, soldiers=[7])
+    memory = {5: Heard(1, 20, mask=0b111_1110_0111)}
+    assert hearing.due(memory.get, 3) is None
+    assert hearing.due(memory.get, 2) is not None
+
+
+def test_a_listener_has_only_what_it_said_to_have_heard() -> None:
+    """Stand-ins that lose next to nothing have all of it; the real one heard only counter 2 of three."""
+    listeners = Listeners(0.01, seed=1)
+    listeners.widen(3)
+    for counter in range(3):
+        listeners.spoke(counter, spoken(counter, second=float(counter)))
+    listeners.told(9, Feedback(1, 2, 4, 0), START_NS)
+    assert listeners.pictures.known.all(axis=0).tolist() == [False, False, True]
+    assert listeners.pictures.known.any(axis=0).tolist() == [False, False, True]
+
+
+def test_who_was_heard_but_tells_nothing_keeps_his_stand_ins() -> None:
+    listeners = Listeners(0.5, seed=1)
+    listeners.widen(1)
+    listeners.heard_from(8, START_NS)
+    listeners.heard_from(9, START_NS)
+    listeners.spoke(0, spoken(0))
+    listeners.told(9, Feedback(1, 0, 4, 0), START_NS)
+    assert not listeners.all_tell
+    assert 0 < (~listeners.pictures.known[:, 0]).sum() <= listeners.pictures.rows // 2
+    listeners.spoke(1, spoken(0, second=1.0))
+    told = listeners.pictures.rows - listeners._strangers
+    ours, stand_ins = listeners.pictures.time_s[told:], listeners._stand_ins.time_s[: listeners._strangers]
+    assert (ours == stand_ins).all()
+    listeners.told(8, Feedback(1, 1, 4, 0b1), START_NS)
+    assert listeners.all_tell
+    assert listeners.pictures.known.all()

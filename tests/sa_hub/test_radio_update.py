@@ -18,7 +18,8 @@ from sa_hub.radio.history import allowed_cells
 from sa_hub.radio.layout import LATTICES, MISSES
 from sa_hub.radio.quantise import PACES
 from sa_hub.radio.references import References, resolved
-from sa_hub.radio.scheduler import Policy, Room, Scheduler
+from sa_hub.radio.room import Room
+from sa_hub.radio.scheduler import Policy, Scheduler
 
 S = 1_000_000_000
 TICK = S // 10
@@ -45,25 +46,33 @@ feedbacks = st.none() | st.integers(1, 8).flatmap(
 
 
 @st.composite
+def an_entry(draw: st.DrawFn, number: int, reach: int, *, varied: bool) -> Entry:
+    """Any entry of a frame with this reach; where it varies, a bit less near by and two more far off."""
+    far, steady = varied and draw(st.booleans()), varied and draw(st.booleans())
+    cells = st.integers(0, 2 ** (reach + varied * (2 if far else -1)) - 1)
+    velocities = st.none() if steady else st.none() | st.tuples(st.integers(0, 15), speeds)
+    return Entry(
+        number,
+        draw(cells),
+        draw(cells),
+        draw(velocities),
+        draw(st.sampled_from([0, 0, 41, 60])),
+        draw(qualities),
+        draw(levels),
+        far,
+        steady,
+    )
+
+
+@st.composite
 def updates(draw: st.DrawFn) -> Update:
     """Any update that a frame can hold, its low bits only."""
     resolution, reach = draw(st.sampled_from(LATTICES))
-    cells = st.integers(0, 2**reach - 1)
+    varied = draw(st.booleans())
     numbers = draw(st.lists(st.integers(0, 1023), min_size=1, max_size=64, unique=True))
-    entries = tuple(
-        Entry(
-            number,
-            draw(cells),
-            draw(cells),
-            draw(st.none() | st.tuples(st.integers(0, 15), speeds)),
-            draw(st.sampled_from([0, 0, 41, 60])),
-            draw(qualities),
-            draw(levels),
-        )
-        for number in sorted(numbers)
-    )
+    entries = tuple(draw(an_entry(number, reach, varied=varied)) for number in sorted(numbers))
     misses = draw(st.sampled_from(MISSES))
-    return Update(draw(st.integers(0, 255)), resolution, reach, misses, entries, draw(feedbacks))
+    return Update(draw(st.integers(0, 255)), resolution, reach, misses, entries, draw(feedbacks), varied)
 
 
 @settings(deadline=None, max_examples=60)
@@ -152,6 +161,21 @@ def test_a_place_within_the_guard_of_the_prediction_is_found(
     off = abs((found.longitude_deg - longitude + 180.0) % 360.0 - 180.0)
     assert abs(found.latitude_deg - latitude) <= 0.51 * row_deg * 2**resolution
     assert off <= 0.51 * grid.column_deg(resolution)
+
+
+@pytest.mark.parametrize(("far", "reach"), [(False, 3), (True, 6)])
+def test_who_goes_on_as_before_is_told_by_his_place_alone(far: bool, reach: int) -> None:
+    """A frame of reach 4 that varies: 3 bits near by, 6 far off; the velocity is the one told before."""
+    grid, tick = Grid(ORIGIN), START_NS // TICK + 80
+    before = Report(7, START_NS, 59.35, 18.07, 1.0, 0.0, 1.25)
+    gone_m = moved_m(0.0, 1.25, 8.0)[1] + (50.0 if far else 5.0)
+    latitude = 59.35 + gone_m / METRES_PER_DEG
+    row, column = grid.row(latitude, 3) % 2**reach, grid.column(18.07, 3) % 2**reach
+    entry = Entry(7, row, column, None, far=far, steady=True)
+    found = resolved(grid, before, Update(tick % 512, 3, 4, 0, (entry,), varied=True), entry, tick)
+    assert found is not None
+    assert found.latitude_deg == pytest.approx(latitude, abs=1.3 / METRES_PER_DEG)
+    assert (found.east_m_s, found.north_m_s) == (0.0, 1.25)
 
 
 def references_told(counter: int = 0) -> References:

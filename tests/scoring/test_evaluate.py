@@ -16,7 +16,8 @@ from support.walking_foot import STRIDE_M, walking_foot, write_run_folder
 
 COLUMNS = """
 run kind method duration_s distance_m rmse_m p95_m final_m final_pct distance_error_pct height_final_m
-heading_drift_deg_per_min inside_95_pct nees samples us_per_sample strides strides_true
+height_rmse_m heading_drift_deg_per_min inside_95_pct nees floors_right_pct samples us_per_sample strides
+strides_true
 """
 WALK = walking_foot(strides=20)
 
@@ -81,6 +82,18 @@ def test_two_feet_have_a_row_each(
     assert {row["kind"] for row in rows} == {"dual"}
 
 
+def test_only_two_feet_are_smoothed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    feet = {"left_foot": walking_foot(8), "right_foot": walking_foot(8, seed=1, offset_m=-0.2)}
+    folder = write_run_folder(tmp_path / "pair", feet)
+    rows = rows_of(monkeypatch, capsys, folder, "--smoothed", "--method", "all")
+    assert {"pair/left", "pair/right", "pair/fused"} == {row["run"] for row in rows}
+    assert "joint-18" not in {row["method"] for row in rows}
+    assert bootprint(monkeypatch, folder, "--kind", "foot", "--smoothed") == 2
+    assert "two feet" in capsys.readouterr().err
+
+
 def test_start_alignment_is_never_better_than_the_best_fit(
     walk_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -131,7 +144,7 @@ def test_a_narrow_terminal_gets_the_most_telling_columns_whole() -> None:
         assert ("strides" in table[0]) == (width == 200)
 
 
-def test_runs_without_an_estimator_are_told(
+def test_a_camera_s_recorded_motions_make_a_row_but_not_by_a_foot_s_method(
     walk_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     camera = tmp_path / "camera"
@@ -140,9 +153,9 @@ def test_runs_without_an_estimator_are_told(
     (camera / "camera_motion.csv").write_text(motion)
     assert bootprint(monkeypatch, walk_folder, camera, "--json", "-") == 0
     captured = capsys.readouterr()
-    assert [row["run"] for row in json.loads(captured.out)] == ["square"]
-    assert "run=camera kind=camera" in captured.err
-    assert bootprint(monkeypatch, camera) == 2
+    rows = {row["run"]: row["kind"] for row in json.loads(captured.out)}
+    assert rows == {"square": "foot", "camera": "camera"}
+    assert bootprint(monkeypatch, camera, "--method", "shoe") == 2
     assert "no estimator for kind camera" in capsys.readouterr().err
 
 

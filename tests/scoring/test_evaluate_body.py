@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pdr_engine.body import BodyNavigator
+from pdr_engine.body import BodyNavigator, BodySettings
 from pdr_engine.body.methods import METHODS
-from proving_ground.evaluation.body import body_chain, body_track
+from proving_ground.evaluation.body import body_chain, body_track, walk_body
+from proving_ground.evaluation.body_fixes import Receiver, pns_track, with_fixes
 from proving_ground.evaluation.evaluate import evaluate_task, methods_of, plan
+from proving_ground.evaluation.floors import Floors, floors_right_pct
 from sensor_gateway.recordings import load_runs
-from sensor_gateway.recordings.run import ImuSeries
+from sensor_gateway.recordings.run import GnssSeries, ImuSeries, Truth
 from support.walking_trunk import START_NS, trunk_walk
 
 FREQUENCY_HZ, LENGTH_M = 1.8, 0.66
@@ -73,3 +75,54 @@ def test_track_and_chain_lead_to_the_same_place() -> None:
     assert (np.diff(track.time_s) > 0.0).all()
     np.testing.assert_allclose(chain.covariance[5, 0, 0], steps[5].length_sigma_m ** 2)
     assert body_chain([]) is None
+
+
+def test_floors_count_from_the_first_of_each_and_only_where_known() -> None:
+    told = Floors(np.array([5.0, 10.0, 20.0]), np.array([0.0, 1.0, 2.0]))
+    times = np.array([0.0, 9.0, 10.0, 15.0, 25.0])
+    truth = Truth(times, np.zeros((5, 3)), floor=np.array([3.0, 4.0, 4.0, np.nan, 5.0]))
+    assert floors_right_pct(told, truth) == pytest.approx(75.0)  # wrong at 9 s alone
+    assert floors_right_pct(None, truth) is None
+    assert floors_right_pct(told, Truth(times, np.zeros((5, 3)))) is None
+
+
+def test_a_run_folder_s_barometer_and_floors_are_scored(folder: Path) -> None:
+    seconds = np.arange(0.0, 42.0, 0.2)
+    pressure = 101_325.0 - 12.0 * 3.0 * np.clip((seconds - 20.0) / 10.0, 0.0, 1.0)
+    np.savetxt(
+        folder / "pressure.csv",
+        np.column_stack([seconds, pressure]),
+        delimiter=",",
+        header="time_s,pressure_pa",
+        comments="",
+    )
+    way = np.genfromtxt(folder / "truth.csv", delimiter=",", skip_header=1)
+    floor = np.where(way[:, 0] < 20.0, 2.0, np.where(way[:, 0] > 31.0, 3.0, np.nan))
+    up = 3.0 * np.clip((way[:, 0] - 20.0) / 10.0, 0.0, 1.0)
+    table = np.column_stack([way, up, floor])
+    header = "time_s,east_m,north_m,up_m,floor"
+    np.savetxt(folder / "truth.csv", table, delimiter=",", header=header, comments="")
+    (task,) = plan(load_runs([folder]), None, methods_of("default"))
+    row = evaluate_task(task, "best-fit").row
+    assert float(row["height_rmse_m"] or 99.0) < 0.6
+    assert row["floors_right_pct"] == pytest.approx(100.0)
+
+
+def test_poor_fixes_change_nothing(folder: Path) -> None:
+    (run,) = load_runs([folder])
+    like = GnssSeries(np.arange(0.0, 40.0, 2.0), *np.full((8, 20), np.nan))
+    like.h_acc_m[:] = np.linspace(22.0, 669.0, 20)
+    poor = with_fixes(run, Receiver("poor", None, 3.0), like, seed=2)
+    assert poor.gnss is not None
+    assert np.isfinite(poor.gnss.lat_deg).all()
+    alone = body_track(walk_body(run, BodySettings()).steps, run.imus["body"])
+    heard = body_track(walk_body(poor, BodySettings()).steps, run.imus["body"])
+    np.testing.assert_array_equal(heard.position_m, alone.position_m)
+    filtered = pns_track(poor, BodySettings())
+    np.testing.assert_allclose(
+        filtered.position_m[-1, :2] - filtered.position_m[0, :2],
+        alone.position_m[-1, :2] - alone.position_m[0, :2],
+        atol=1e-9,
+    )
+    good = with_fixes(run, Receiver("good", 3.0, 1.0), like, seed=2)
+    assert not np.allclose(pns_track(good, BodySettings()).position_m[-1, :2], filtered.position_m[-1, :2])

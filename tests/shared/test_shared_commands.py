@@ -1,4 +1,4 @@
-"""`bootprint record`, `replay`, `info`, `bus` and `fix` against a real router."""
+"""`bootprint record`, `replay`, `info`, `bus`, `fix`, `alert` and so on against a real router."""
 
 import json
 import math
@@ -15,9 +15,9 @@ import typer
 from typer.testing import CliRunner
 
 from bootprint.bus import Envelope
-from bootprint.commands import bus, fix, recordings
+from bootprint.commands import bus, fix, recordings, tell
 from bootprint.errors import BootprintError, BusError, ConfigError, RecordingError
-from bootprint.messages import Fix, Message, Position, Pressure
+from bootprint.messages import Alert, Fix, Message, Observation, Position, Pressure, Status
 from bootprint.recording import Recorder, Recording
 from bootprint.topics import Identity
 from bootprint.zenoh_bus import open_bus
@@ -27,8 +27,10 @@ from support.waiting import wait_until
 A3 = Identity("bp", "alpha", "a3")
 S = 1_000_000_000
 
+WHOSE = ("--realm", "r", "--unit", "u", "--soldier", "s")
+
 app = typer.Typer()
-for module in (recordings, bus, fix):
+for module in (recordings, bus, fix, tell):
     module.register(app)
 
 
@@ -205,7 +207,7 @@ def test_rates_are_shown_as_a_table(router: str) -> None:
 
 
 def test_a_fix_is_published(router: str) -> None:
-    with listening(router) as heard, running_fusion(router):
+    with listening(router) as heard, running(router, "fusion"):
         run("fix", "-33.9", "18.4", "--realm", "bp", "--unit", "alpha", "--soldier", "a3",
             "--azimuth", "-90", "--at", 12, "--router", router)  # fmt: skip
         wait_until(lambda: heard, what="the fix")
@@ -220,12 +222,44 @@ def test_a_fix_is_published(router: str) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["alert", "contact", "two men"],
+            Alert(time_ns=12 * S, soldier="a3", kind="contact", text="two men"),
+        ),
+        (
+            ["status", "wounded", "--battery", "40"],
+            Status(time_ns=12 * S, soldier="a3", condition="wounded", battery_pct=40.0),
+        ),
+        (
+            ["observation", "-33.9", "18.4", "on the roof", "--code", "sniper"],
+            Observation(
+                time_ns=12 * S,
+                soldier="a3",
+                latitude_deg=-33.9,
+                longitude_deg=18.4,
+                accuracy_m=10.0,
+                text="on the roof",
+                code="sniper",
+            ),
+        ),
+    ],
+)
+def test_what_a_person_tells_is_published(router: str, arguments: list[str], message: Message) -> None:
+    with listening(router) as heard, running(router, "sa-hub"):
+        run(*arguments, "--realm", "bp", "--unit", "alpha", "--soldier", "a3", "--at", 12, "--router", router)
+        wait_until(lambda: heard, what="the message")
+    assert heard == [message]
+
+
 @contextmanager
-def running_fusion(router: str) -> Iterator[None]:
-    """A3's fusion as the router sees it: its liveliness token."""
+def running(router: str, service: str) -> Iterator[None]:
+    """One of A3's services as the router sees it: its liveliness token."""
     bus = open_bus(router)
-    bus.declare_alive(A3, "fusion")
-    wait_until(lambda: bus.alive(A3.selector("health", "fusion")), what="the token")
+    bus.declare_alive(A3, service)
+    wait_until(lambda: bus.alive(A3.selector("health", service)), what="the token")
     try:
         yield
     finally:
@@ -235,6 +269,11 @@ def running_fusion(router: str) -> Iterator[None]:
 def test_a_fix_that_nobody_hears_is_an_error(router: str) -> None:
     with pytest.raises(BusError, match="neither fusion nor sa-hub of a3 runs"):
         run("fix", "1", "2", "--realm", "bp", "--unit", "alpha", "--soldier", "a3", "--router", router)
+
+
+def test_an_alert_that_no_hub_hears_is_an_error(router: str) -> None:
+    with pytest.raises(BusError, match="no sa-hub of a3 runs"):
+        run("alert", "help", "--realm", "bp", "--unit", "alpha", "--soldier", "a3", "--router", router)
 
 
 @pytest.mark.parametrize(
@@ -281,7 +320,7 @@ def test_info_salvages_a_damaged_recording(walk: Path, tmp_path: Path) -> None:
         (["replay", "WALK", "--speed", "inf"], ConfigError, "--speed 'inf'"),
         (["replay", "WALK", "--subject", "imus"], ConfigError, "--subject 'imus' is unknown; known: imu"),
         (["info", "WALK", "--json", "/none/x.json"], ConfigError, "--json /none/x.json: cannot be written"),
-        (["fix", "1", "2"], ConfigError, "whose place is it"),
+        (["fix", "1", "2"], ConfigError, "whose is it? Give --config"),
         (
             ["fix", "1", "2", "--azimuth", "400", "--realm", "r", "--unit", "u", "--soldier", "s"],
             ConfigError,
@@ -298,6 +337,11 @@ def test_info_salvages_a_damaged_recording(walk: Path, tmp_path: Path) -> None:
             "soldier 'a/b' must",
         ),
         (["fix", "1", "2", "--config", "none.toml"], ConfigError, "none.toml: no such file"),
+        (["alert", "hello", *WHOSE], ConfigError, "not an alert: Invalid enum value 'hello'"),
+        (["alert", "help", "x" * 201, *WHOSE], ConfigError, "not an alert: "),
+        (["status", "ok", "--battery", "101", *WHOSE], ConfigError, "not a status: "),
+        (["observation", "1", "2", "--code", "ufo", *WHOSE], ConfigError, "not an observation: Invalid enum"),
+        (["observation", "1", "200", *WHOSE], ConfigError, "not an observation: "),
     ],
 )
 def test_bad_input_is_one_line(
@@ -315,6 +359,8 @@ def test_without_a_router_nothing_is_written(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("command", ["record", "replay", "info", "fix", "bus echo", "bus rates"])
+@pytest.mark.parametrize(
+    "command", ["record", "replay", "info", "fix", "alert", "status", "observation", "bus echo", "bus rates"]
+)
 def test_help_teaches_with_an_example(command: str) -> None:
     assert f"Example: bootprint {command}" in run(*command.split(), "--help")

@@ -153,6 +153,14 @@ def _updates() -> Iterator[tuple[str, Content, None]]:
     yield "update of four, much has changed, one is not known", all_told, None
     fine = (_entry(2, 59.35021, 18.06979, (4, 6)), _entry(3, 59.35031, 18.06969, None))
     yield "update on fine cells", _update(1, 6, 1, *fine), None
+    going_on = (
+        _entry(2, 59.35023, 18.06981, (5, 6)),
+        replace(_entry(3, 59.35033, 18.06967, None, 30), steady=True),
+        replace(_entry(4, 59.3511, 18.0701, None, 22), steady=True, far=True),
+        replace(_entry(12, 59.3494, 18.0664, None), far=True),
+        replace(_entry(30, 59.35121, 18.0723, None, 41), steady=True),
+    )
+    yield "update of five, some go on as before", replace(_update(3, 4, 3, *going_on), varied=True), None
 
 
 def _entry(
@@ -281,6 +289,8 @@ def _value(expression: int | str, known: Mapping[str, int]) -> int:
         ),
         "4 · span + 4": lambda: 4 * known["span"] + 4,
         "reach": lambda: layout.LATTICES[known.get("lattice", known.get("wide", 0))][1],
+        layout.NEAR_REACH: lambda: _value("reach", known) + layout.NEAR_BITS,
+        layout.FAR_REACH: lambda: _value("reach", known) + layout.FAR_BITS,
     }
     if expression in expressions:
         return expressions[expression]()

@@ -3,9 +3,10 @@
 The same run and configuration give the same bytes, every time.
 """
 
-from collections.abc import Iterator
+import heapq
+from collections.abc import Iterable, Iterator
 
-from bootprint.bus import Core, MemoryBus
+from bootprint.bus import Core, Envelope, MemoryBus
 from bootprint.config import Origin
 from bootprint.messages import Position
 from bootprint.topics import Identity
@@ -17,18 +18,29 @@ from pdr_engine.engine import SUBJECTS as PDR_SUBJECTS
 from pdr_engine.engine import EngineCore
 from sensor_gateway.recordings.run import Run
 from sensor_gateway.sources.run_messages import run_messages
+from sensor_gateway.stamps import due_ns
 
 
 def play_run(
-    run: Run, identity: Identity, origin: Origin, pdr: PdrConfig, fusion: FusionConfig, start_ns: int
+    run: Run,
+    identity: Identity,
+    origin: Origin,
+    pdr: PdrConfig,
+    fusion: FusionConfig,
+    start_ns: int,
+    others: Iterable[Envelope] = (),
 ) -> MemoryBus:
-    """Play a whole run through pdr-engine and fusion; the bus's journal holds all that was said."""
+    """Play a whole run through pdr-engine and fusion; the bus's journal holds all that was said.
+
+    ``others``: further messages of this soldier, in the order of their stamps, that come between the run's.
+    """
     bus = MemoryBus()
     engine = EngineCore(pdr, identity, origin)
     fuser = FusionCore(fusion, identity, origin)
     _attach(bus, engine, identity, PDR_SUBJECTS)
     _attach(bus, fuser, identity, FUSION_SUBJECTS)
-    for envelope in run_messages(run, identity, start_ns):
+    run_own = run_messages(run, identity, start_ns)
+    for envelope in heapq.merge(run_own, others, key=lambda envelope: due_ns(envelope.message)):
         bus.publish(envelope)
     for last_words in (engine.close, fuser.close):
         for envelope in last_words():

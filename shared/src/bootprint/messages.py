@@ -8,6 +8,7 @@ so what passes here is finite and of the right shape.
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import Annotated, Literal
 
 import msgspec
@@ -169,8 +170,11 @@ class GnssFix(Message, frozen=True):
 class CameraMotion(Message, frozen=True):
     """Motion of a camera between ``start_time_ns`` and ``time_ns``, in the camera body's axes at the start.
 
-    Axes forward, left, up. ``covariance`` is the upper triangle (21 numbers, row by row) of the 6x6 matrix of
-    (translation m, rotation vector rad), None if unknown.
+    Axes forward, left, up. A motion that starts where the one before it started replaces it (odometry tells what
+    happened since its key frame); a gap between one's end and the next one's start is time that nobody saw.
+    ``covariance`` is the upper triangle (21 numbers, row by row) of the 6x6 matrix of
+    (translation m, rotation vector rad), None if unknown. ``up``: where up is at the start, in the same axes, if an
+    inertial unit tells it.
     """
 
     start_time_ns: TimeNs
@@ -178,6 +182,7 @@ class CameraMotion(Message, frozen=True):
     rotation_rad: Vector3
     covariance: Annotated[tuple[float, ...], msgspec.Meta(min_length=21, max_length=21)] | None = None
     confidence_pct: Percent | None = None
+    up: Vector3 | None = None
 
 
 class Range(Message, frozen=True):
@@ -291,6 +296,12 @@ class Position(Message, frozen=True):
 
     ``covariance_m2`` is (ee, en, eu, nn, nu, uu). ``course_rad`` is the direction of motion, ``facing_rad`` the
     direction of the body; azimuths clockwise from true north.
+
+    ``rejections`` tells of each source that is left out why: ``innovation`` (its newest value is too far off),
+    ``diverged`` (a foot that contradicts the other and looks wrong by itself),
+    ``spoofed`` (it has walked away from dead reckoning, and is not believed until it is back). ``protection_m``:
+    the horizontal error stays within with 95 %, even if a disturbance of the size that no check would notice has
+    moved the position by ``external_reliability_m`` (METHODS A9).
     """
 
     mode: Mode
@@ -312,6 +323,9 @@ class Position(Message, frozen=True):
     sources: tuple[str, ...] = ()
     rejected: tuple[str, ...] = ()
     reliability_pct: Percent | None = None
+    rejections: dict[str, str] = {}
+    protection_m: NonNegative | None = None
+    external_reliability_m: NonNegative | None = None
 
 
 class Track(Message, frozen=True):
@@ -403,11 +417,18 @@ class Health(Message, frozen=True):
     note: str = ""
 
 
+@cache
+def _triangle(size: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Rows and columns of an upper triangle; kept, for making them costs more than using them."""
+    rows, columns = np.triu_indices(size)
+    return rows, columns
+
+
 def upper_triangle(matrix: npt.ArrayLike) -> tuple[float, ...]:
     """The upper triangle of a symmetric matrix (n, n), row by row, as a tuple of n(n+1)/2 floats."""
     square = np.asarray(matrix, dtype=np.float64)
-    rows, columns = np.triu_indices(square.shape[0])
-    return tuple(float(value) for value in square[rows, columns])
+    rows, columns = _triangle(square.shape[0])
+    return tuple(square[rows, columns].tolist())
 
 
 def symmetric(triangle: Sequence[float]) -> Float64Array:
@@ -416,7 +437,7 @@ def symmetric(triangle: Sequence[float]) -> Float64Array:
     if size * (size + 1) // 2 != len(triangle):
         raise ValueError(f"{len(triangle)} numbers are no triangle of a square matrix")
     matrix = np.zeros((size, size))
-    rows, columns = np.triu_indices(size)
+    rows, columns = _triangle(size)
     matrix[rows, columns] = triangle
     matrix[columns, rows] = triangle
     return matrix

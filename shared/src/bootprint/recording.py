@@ -4,8 +4,8 @@ One channel per key. Messages stand in the file exactly as they were on the wire
 own time as log time and, if known, the time of reception as publish time. The MCAP registry knows ``msgpack``
 as a message encoding and names no schema language for it; ``jsonschema`` is the only registered one that can
 describe a map, so each channel carries the JSON schema of its struct, in which binary arrays stand as base64
-text, JSON's nearest. Readers that do not speak MessagePack skip these channels; for their sake positions are
-written a second time as Foxglove's LocationFix in JSON.
+text, JSON's nearest. Readers that do not speak MessagePack skip these channels; for their sake positions, tracks
+and observations are written a second time as Foxglove's LocationFix and GeoJSON, in JSON.
 """
 
 import heapq
@@ -24,7 +24,6 @@ from mcap.writer import CompressionType, Writer
 from bootprint import foxglove, mcap_survey, wire
 from bootprint.bus import Envelope, matches
 from bootprint.errors import RecordingError, WireError
-from bootprint.messages import Position
 from bootprint.salvage import address_of, survey_report
 from bootprint.topics import Address
 
@@ -57,8 +56,9 @@ def _schema_of(topic: str, encoding: str) -> tuple[str, bytes]:
 
     A message's root is the object itself: simple readers insist on ``"type": "object"`` there.
     """
-    if encoding == "json" and topic.endswith(foxglove.TOPIC_SUFFIX):
-        return foxglove.SCHEMA_NAME, foxglove.schema()
+    copy = foxglove.suffix_of(topic)
+    if encoding == "json" and copy is not None:
+        return foxglove.SCHEMA_NAMES[copy], foxglove.schema(copy)
     address = address_of(topic, encoding)
     if address is None:
         return "", b""
@@ -96,7 +96,7 @@ class Recorder:
         self._writer.start(profile="", library=LIBRARY)
 
     def write(self, envelope: Envelope, received_ns: int | None = None) -> None:
-        """Record one message; a position also as LocationFix."""
+        """Record one message; one with a place also as Foxglove's map understands it."""
         self.write_payload(envelope.address.key, wire.encode(envelope.message), received_ns)
 
     def write_payload(self, key: str, payload: bytes, received_ns: int | None = None) -> None:
@@ -109,17 +109,17 @@ class Recorder:
         self.write_record(key, "msgpack", payload, stamp, publish_ns)
         self.messages += 1
         address = address_of(key, "msgpack")
-        if address is not None and address.topic.message is Position:
-            self._write_location_fix(address, payload, stamp)
+        if address is not None and address.topic.message in foxglove.COPIED:
+            self._write_copy(address, payload, stamp)
 
-    def _write_location_fix(self, address: Address, payload: bytes, stamp: "Stamp") -> None:
+    def _write_copy(self, address: Address, payload: bytes, stamp: "Stamp") -> None:
         try:
-            position = wire.decode(address.subject, payload)
+            copy = foxglove.copy_of(address, wire.decode(address.subject, payload))
         except WireError:
             return
-        if isinstance(position, Position):
-            data = foxglove.location_fix(address, position)
-            self.write_record(address.key + foxglove.TOPIC_SUFFIX, "json", data, stamp, stamp.time_ns)
+        if copy is not None:
+            suffix, data = copy
+            self.write_record(address.key + suffix, "json", data, stamp, stamp.time_ns)
 
     def write_record(self, topic: str, encoding: str, data: bytes, stamp: "Stamp", publish_ns: int) -> None:
         """Record bytes of any topic and encoding."""

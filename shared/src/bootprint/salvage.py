@@ -91,7 +91,7 @@ def survey_report(path: Path, survey: mcap_survey.Survey) -> Salvage:
             continue
         if address_of(channel.topic, channel.message_encoding):
             report.add(channel.topic, count, *survey.spans[number])
-        elif channel.topic.endswith(foxglove.TOPIC_SUFFIX):
+        elif foxglove.suffix_of(channel.topic) is not None:
             report.derived += count
         else:
             report.unknown += count

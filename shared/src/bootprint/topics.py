@@ -13,6 +13,7 @@ from functools import lru_cache
 from bootprint import awareness as aware
 from bootprint import messages as m
 from bootprint.errors import WireError
+from bootprint.foreign import ForeignTrack
 
 VERSION = "@v1"
 _PART = re.compile(r"[A-Za-z0-9_.-]{1,64}\Z")
@@ -60,6 +61,7 @@ TOPICS: tuple[Topic, ...] = (
         "aim", aware.Aim, Qos.STREAM, None, "weapon sensors, tools", True, "where a soldier's weapon points"
     ),
     Topic("track", m.Track, Qos.STATE, None, "sa-hub", True, "a hub's picture of one soldier"),
+    Topic("foreign_track", ForeignTrack, Qos.STATE, None, "sa-hub", True, "a unit of others, from TAK"),
     Topic("link", m.LinkReport, Qos.STATE, 1.0, "sa-hub", True, "what a radio link carried"),
     Topic("alert", m.Alert, Qos.ASSURED, None, "sa-hub", True, "alerts"),
     Topic("observation", m.Observation, Qos.ASSURED, None, "sa-hub", True, "observations"),

@@ -19,7 +19,7 @@ START_M = 5.0
 # Motion capture trembles by a millimetre at every sample: path length is summed no finer than this.
 PATH_INTERVAL_S = 0.05
 # A truth denser than this follows the foot through its swing; a sparser one is a list of way-points.
-DENSE_INTERVAL_S = 0.1
+DENSE_INTERVAL_S = 0.101  # cameras' poses come at 10 Hz
 _STILL_M_S, _STILL_SPAN_S, _STILL_AT_LEAST_S = 0.15, 0.05, 0.05
 _STRIDE_AT_LEAST_M = 0.15
 _OUTSIDE_S = 0.2

@@ -3,16 +3,23 @@
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pdr_engine.body import BodyNavigator, BodySettings, BodyStepEstimate
+from bootprint.config import Origin
+from bootprint.messages import GnssFix, ImuBatch, Message, Pressure
+from bootprint.topics import Identity
+from pdr_engine.body import BodySettings, BodyStepEstimate
+from pdr_engine.trunk import Trunk
 from proving_ground.evaluation.alignment import Track
 from proving_ground.evaluation.consistency import StepChain
-from sensor_gateway.recordings.run import FloatArray, ImuSeries
+from proving_ground.evaluation.floors import Floors
+from sensor_gateway.recordings.run import FloatArray, ImuSeries, Run
+from sensor_gateway.sources.run_messages import run_messages
 
-BATCH = 10
+BODY = "body"
+_IDENTITY = Identity("evaluate", "evaluate", "evaluate")
 _NS_PER_S = 1e9
 
 
@@ -24,26 +31,35 @@ class BodyWalk:
     seconds: float
 
 
-def walk_body(imu: ImuSeries, settings: BodySettings) -> BodyWalk:
-    """A run through the navigator, batch by batch as on the bus."""
-    navigator = BodyNavigator(settings)
-    time_ns = np.round(imu.time_s * _NS_PER_S).astype(np.int64)
+def walk_body(run: Run, settings: BodySettings) -> BodyWalk:
+    """A run through the body-worn unit's part of the engine, message by message as on the bus.
+
+    It hears what the run has of pressure and satellites, too.
+    """
+    origin = None if run.origin is None else Origin(*run.origin)
+    trunk = Trunk(settings, _IDENTITY.address("imu", BODY), origin)
+    alone = replace(run, imus={BODY: run.imus[BODY]}, camera=None, ranges=None)
+    messages = [envelope.message for envelope in run_messages(alone, _IDENTITY, start_ns=0)]
     begin = time.thread_time()
-    steps = [
-        step
-        for start in range(0, len(time_ns), BATCH)
-        for step in navigator.process(
-            time_ns[start : start + BATCH],
-            imu.accel_m_s2[start : start + BATCH],
-            imu.gyro_rad_s[start : start + BATCH],
-            None if imu.mag_ut is None else imu.mag_ut[start : start + BATCH],
-        )
-    ]
+    steps = [step for message in messages for step in _heard(trunk, message)]
     return BodyWalk(steps, time.thread_time() - begin)
 
 
+def _heard(trunk: Trunk, message: Message) -> list[BodyStepEstimate]:
+    if isinstance(message, ImuBatch):
+        return trunk.estimates(message)
+    if isinstance(message, Pressure):
+        trunk.hear_pressure(message)
+    if isinstance(message, GnssFix):
+        trunk.hear_fix(message)
+    return []
+
+
 def body_track(steps: Sequence[BodyStepEstimate], imu: ImuSeries) -> Track:
-    """Where the steps lead from (0, 0), x east if azimuths are from north; still between bouts."""
+    """Where the steps lead from (0, 0), x east if azimuths are from north; still between bouts.
+
+    Heights are those of the steps, NaN if no step has one.
+    """
     time_s, place = [float(imu.time_s[0])], [np.zeros(2)]
     for step in steps:
         if step.start_ns / _NS_PER_S > time_s[-1]:
@@ -55,8 +71,24 @@ def body_track(steps: Sequence[BodyStepEstimate], imu: ImuSeries) -> Track:
     if (end_s := float(imu.time_s[-1])) > time_s[-1]:
         time_s.append(end_s)
         place.append(place[-1])
-    plane = np.array(place)
-    return Track(np.array(time_s), np.column_stack([plane, np.zeros(len(plane))]))
+    return Track(np.array(time_s), np.column_stack([np.array(place), _heights_m(steps, time_s)]))
+
+
+def _heights_m(steps: Sequence[BodyStepEstimate], time_s: Sequence[float]) -> FloatArray:
+    known = [(step.time_ns / _NS_PER_S, step.height.height_m) for step in steps if step.height is not None]
+    if not known:
+        return np.full(len(time_s), np.nan)
+    at_s, height_m = np.array(known).T
+    return np.asarray(np.interp(time_s, at_s, height_m))
+
+
+def body_floors(steps: Sequence[BodyStepEstimate]) -> Floors | None:
+    """The floors that steps told; None if none did."""
+    told = [(step.time_ns / _NS_PER_S, step.height.floor) for step in steps if step.height is not None]
+    if not told:
+        return None
+    time_s, number = np.array(told, dtype=np.float64).T
+    return Floors(time_s, number)
 
 
 def body_chain(steps: Sequence[BodyStepEstimate]) -> StepChain | None:

@@ -123,18 +123,33 @@ def score(
 
 def simulated(seed: int, iron: float, outside_m: float = 300.0) -> AzimuthScore:
     """A walk outdoors, about in a building, and on; ``iron`` 1 is what malls have, 0 none."""
+    return _scored(f"iron {iron:g}", *walk_past_iron(seed, iron, outside_m))
+
+
+def _scored(name: str, imu: ImuSeries, torso_azimuth: FloatArray) -> AzimuthScore:
+    level = levelled(imu, _AHEAD)
+    steps = steps_of(level)
+    assert level.mag_ut is not None
+    truth = _over_steps(torso_azimuth, steps) - CENTRAL_EUROPE.declination_rad
+    return score(name, steps, level.mag_ut, truth, CENTRAL_EUROPE)
+
+
+def walk_past_iron(
+    seed: int, iron: float, outside_m: float = 300.0, person_seed: int | None = None
+) -> tuple[ImuSeries, FloatArray]:
+    """A unit at the trunk, and the torso's true azimuths (n,) at its samples; another person on the same way."""
     rng = np.random.default_rng(seed)
-    motion = move(Person.drawn(rng), Itinerary((Leg("walk", _way(rng, outside_m)),), start_s=3.0), seed)
+    person, way = Person.drawn(rng), _way(rng, outside_m)
+    if person_seed is not None:
+        rng = np.random.default_rng(person_seed)
+        person = Person.drawn(rng)
+    motion = move(person, Itinerary((Leg("walk", way),), start_s=3.0), seed)
     magnetics = Magnetics(CENTRAL_EUROPE)
     if iron > 0.0:
         low, high = np.array([outside_m, -30.0, 0.0]), np.array([outside_m + 60.0, 30.0, 3.5])
         magnetics = Magnetics(CENTRAL_EUROPE, storey_iron(low, high, seed, iron))
     imu = measure_imu(motion.torso, motion.duration_s, Mounting(), calibrated_unit(), magnetics, rng)
-    level = levelled(imu, _AHEAD)
-    steps = steps_of(level)
-    assert level.mag_ut is not None
-    truth = _torso_azimuths(motion.torso, level.time_s, steps) - CENTRAL_EUROPE.declination_rad
-    return score(f"iron {iron:g}", steps, level.mag_ut, truth, CENTRAL_EUROPE)
+    return imu, _torso_azimuths(motion.torso, imu.time_s)
 
 
 def calibrated_unit() -> ImuClass:
@@ -144,6 +159,20 @@ def calibrated_unit() -> ImuClass:
 
 def bridged_deg(seed: int, clean_s: float = 600.0) -> dict[str, float]:
     """By how much the gyro alone errs 120 s after ``clean_s`` of walking outdoors with a compass, degrees."""
+    imu, torso_azimuth = long_walk(seed, clean_s)
+    level = levelled(imu, _AHEAD)
+    steps = steps_of(level)
+    assert level.mag_ut is not None
+    truth = _over_steps(torso_azimuth, steps) - CENTRAL_EUROPE.declination_rad
+    errors = {}
+    for method in BRIDGES:
+        found, _ = azimuths(steps, level.mag_ut, method, CENTRAL_EUROPE, blind_from_s=clean_s)
+        errors[method] = float(np.abs(np.degrees(_wrapped(found - truth))[-4:].mean()))
+    return errors
+
+
+def long_walk(seed: int, clean_s: float) -> tuple[ImuSeries, FloatArray]:
+    """As `walk_past_iron`, outdoors for so long and `LONGEST_S` more."""
     rng = np.random.default_rng(seed)
     person = Person.drawn(rng)
     length_m = 1.02 * person.walk_speed_m_s * (clean_s + LONGEST_S)
@@ -151,15 +180,7 @@ def bridged_deg(seed: int, clean_s: float = 600.0) -> dict[str, float]:
     motion = move(person, Itinerary((Leg("walk", length_m * bends),), start_s=3.0), seed)
     magnetics = Magnetics(CENTRAL_EUROPE)
     imu = measure_imu(motion.torso, clean_s + LONGEST_S + 3.0, Mounting(), calibrated_unit(), magnetics, rng)
-    level = levelled(imu, _AHEAD)
-    steps = steps_of(level)
-    assert level.mag_ut is not None
-    truth = _torso_azimuths(motion.torso, level.time_s, steps) - CENTRAL_EUROPE.declination_rad
-    errors = {}
-    for method in BRIDGES:
-        found, _ = azimuths(steps, level.mag_ut, method, CENTRAL_EUROPE, blind_from_s=clean_s)
-        errors[method] = float(np.abs(np.degrees(_wrapped(found - truth))[-4:].mean()))
-    return errors
+    return imu, _torso_azimuths(motion.torso, imu.time_s)
 
 
 def bridging_table(seeds: range = range(1, 12, 2)) -> str:
@@ -182,12 +203,16 @@ def _way(rng: np.random.Generator, outside_m: float) -> FloatArray:
     return np.column_stack([points, np.zeros(len(points))])
 
 
-def _torso_azimuths(torso: Motion, time_s: FloatArray, steps: Steps) -> FloatArray:
-    """The torso's azimuth from true north, mean over each step (n,)."""
+def _torso_azimuths(torso: Motion, time_s: FloatArray) -> FloatArray:
+    """The torso's azimuth from true north, unwrapped (n,)."""
     _, attitude = torso.at(time_s)
     east, north, _ = attitude.apply([1.0, 0.0, 0.0]).T
-    yaw = np.unwrap(np.arctan2(east, north))
-    return np.array([yaw[chosen].mean() for chosen in steps.samples])
+    return np.asarray(np.unwrap(np.arctan2(east, north)))
+
+
+def _over_steps(azimuth: FloatArray, steps: Steps) -> FloatArray:
+    """Mean over each step (k,) of azimuths (n,) at the samples."""
+    return np.array([azimuth[chosen].mean() for chosen in steps.samples])
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,8 @@ from pdr_engine.body.settings import LengthSettings
 from proving_ground.evaluation.alignment import fit_rigid, interpolated
 from proving_ground.evaluation.body import body_track, walk_body
 from proving_ground.evaluation.body_benchmark import measure_body, simulated_belt
-from proving_ground.evaluation.body_parts_page import parts_page
+from proving_ground.evaluation.body_parts_page import chain_page, parts_page
+from proving_ground.evaluation.body_picture import save_classes
 from proving_ground.evaluation.evaluate import Evaluated, evaluate_task, plan
 from proving_ground.evaluation.scoring import score_track
 from proving_ground.evaluation.train_body import SET, cross_fit
@@ -54,11 +55,14 @@ def main(data: Path, docs: Path) -> None:
     rows = [evaluate_task(task, "best-fit") for task in plan(runs, "body", METHODS)]
     (docs / "img").mkdir(parents=True, exist_ok=True)
     save_tracks([one for one in rows if one.task.method == DEFAULT], docs / "img" / "body-tracks.png")
-    text = page(rows, left_out(runs), cross_fit(runs), parts_page(data / SET))
+    save_classes(docs / "img" / "body-classes.png")
+    text = page(rows, left_out(runs), cross_fit(runs), chain_page(data), parts_page(data / SET))
     (docs / "body-module.md").write_text(text, encoding="utf-8")
 
 
-def page(rows: Sequence[Evaluated], held_out: FloatArray, network_pct: Sequence[float], parts: str) -> str:
+def page(
+    rows: Sequence[Evaluated], held_out: FloatArray, network_pct: Sequence[float], chain: str, parts: str
+) -> str:
     """The page's text."""
     cost = measure_body(simulated_belt(seed=1), turns=3)
     network = np.abs(network_pct)
@@ -90,6 +94,14 @@ way-points' own inaccuracy too.
 
 {walk_table([one for one in rows if one.task.method == DEFAULT])}
 
+## The whole chain
+
+Simulated people and what their units measure, through the navigator as on the bus. Choices were made with even
+seeds; the tables are of odd ones.
+
+![height and movement class of every step](img/body-classes.png)
+
+{chain}
 ## Parts
 
 {parts}
@@ -145,7 +157,7 @@ def left_out(runs: Sequence[Run]) -> FloatArray:
 
 def _scored(run: Run, hand_factor: float) -> tuple[float, float]:
     imu = run.imus["body"]
-    steps = walk_body(imu, BodySettings(length=LengthSettings(hand_factor=hand_factor))).steps
+    steps = walk_body(run, BodySettings(length=LengthSettings(hand_factor=hand_factor))).steps
     score = score_track(body_track(steps, imu), run.truth["body"]).score
     return score.rmse_m or 0.0, score.distance_error_pct or 0.0
 

@@ -6,9 +6,11 @@ gyro. GPS as a simulated receiver reports it in the open, and not at all between
 with seeds from 100 on.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import typer
 
 from bootprint.config import Origin
 from bootprint.geodesy import LocalFrame
@@ -53,8 +55,8 @@ def town(seed: int) -> TownScore:
     )
     arcs_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(truth_m, axis=0), axis=1))])
     fixes = _fixes(gnss, np.interp(gnss.time_s, times_s, arcs_m))
-    found, taken = _filtered(times_s, truth_m[0], lengths_m, azimuths, fixes)
-    alone, _ = _filtered(times_s, truth_m[0], lengths_m, azimuths, [])
+    found, taken = filtered(times_s, truth_m[0], lengths_m, azimuths, fixes)
+    alone, _ = filtered(times_s, truth_m[0], lengths_m, azimuths, [])
     error, drift = (np.linalg.norm(track - truth_m[1:], axis=1) for track in (found, alone))
     return TownScore(seed, float(error.max()), float(np.median(error)), float(drift.max()), taken)
 
@@ -106,12 +108,12 @@ def _fixes(gnss: GnssSeries, arc_m: FloatArray) -> list[tuple[float, FloatArray,
     return found
 
 
-def _filtered(
+def filtered(
     times_s: FloatArray,
     start_m: FloatArray,
     lengths_m: FloatArray,
     azimuths: FloatArray,
-    fixes: list[tuple[float, FloatArray, float, int]],
+    fixes: Sequence[tuple[float, FloatArray, float, int | None]],
 ) -> tuple[FloatArray, int]:
     """Places after each step (n − 1, 2), and how many fixes were taken."""
     pns = PnsGps(start_m, 2.0)
@@ -144,4 +146,4 @@ def town_table(seeds: range = range(20)) -> str:
 
 
 if __name__ == "__main__":
-    print(town_table())  # noqa: T201
+    typer.echo(town_table())

@@ -8,6 +8,7 @@ import typer
 
 from bootprint.commands.options import write_json
 from bootprint.errors import ConfigError
+from proving_ground.evaluation import smooth_command
 from proving_ground.evaluation.alignment import Align
 from sensor_gateway.recordings.run import Kind
 
@@ -28,6 +29,8 @@ _TABLE: dict[str, tuple[str, int]] = {
     "final_pct": ("end %", 2),
     "distance_error_pct": ("dist. %", 2),
     "height_final_m": ("height m", 2),
+    "height_rmse_m": ("h. RMSE", 2),
+    "floors_right_pct": ("floors %", 0),
     "heading_drift_deg_per_min": ("°/min", 2),
     "inside_95_pct": ("in 95 %", 0),
     "nees": ("NEES", 1),
@@ -47,18 +50,21 @@ _LESS_TELLING = (
     "p95_m",
     "distance_error_pct",
     "height_final_m",
+    "floors_right_pct",
     "us_per_sample",
     "nees",
     "duration_s",
     "strides",
     "strides_true",
+    "height_rmse_m",
 )
 _NO_LIMIT = 10_000
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command."""
+    """Add the command, and that of smoothed tracks."""
     app.command()(evaluate)
+    smooth_command.register(app)
 
 
 def evaluate(
@@ -68,6 +74,7 @@ def evaluate(
     align: Annotated[
         Align, typer.Option(help="Fit yaw and offset to all truth, or to its first 5 m.")
     ] = "best-fit",
+    smoothed: Annotated[bool, typer.Option(help="Tracks of two feet as known afterwards.")] = False,
     plot: Annotated[Path | None, typer.Option(metavar="DIR", help="Write a picture of every row.")] = None,
     json_file: Annotated[
         str | None, typer.Option("--json", metavar="FILE", help="Write the rows as JSON (- for stdout).")
@@ -84,7 +91,7 @@ def evaluate(
     from proving_ground.evaluation.evaluate import methods_of, plan
     from sensor_gateway.recordings import load_runs
 
-    tasks = plan(load_runs(paths, kind), kind, methods_of(method))
+    tasks = plan(load_runs(paths, kind), kind, methods_of(method), smoothed=smoothed)
     _make_folder(plot)
     done = _compute(tasks, align, plot, Console(stderr=True))
     rows = [evaluated.row for evaluated in done]

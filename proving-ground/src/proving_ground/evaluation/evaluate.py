@@ -10,13 +10,14 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import structlog
 
 from bootprint.config import Origin, convert
 from bootprint.errors import ConfigError
 from bootprint.topics import Identity
 from proving_ground.evaluation.alignment import Align, Track, count_strides, true_strides
 from proving_ground.evaluation.consistency import StepChain
+from proving_ground.evaluation.floors import Floors, floors_right_pct
+from proving_ground.evaluation.joint_ins import METHOD as JOINT
 from proving_ground.evaluation.scoring import Scored, score_track
 from sensor_gateway.recordings.run import FEET, ImuSeries, Kind, Run
 
@@ -27,19 +28,18 @@ Row = dict[str, str | float | int | None]
 BATCH = 10
 ALL = "all"
 FUSED = "fused"
-BODY = "body"
+BODY, CAMERA = "body", "camera"
 _IDENTITY = Identity("evaluate", "evaluate", "evaluate")
 _ORIGIN = Origin(latitude_deg=0.0, longitude_deg=0.0)  # any: only local coordinates are compared
 _NS_PER_S = 1e9
-# Kinds that an estimator exists for; the others say so instead of pretending.
-KINDS: tuple[Kind, ...] = ("foot", "dual", "body")
+KINDS: tuple[Kind, ...] = ("foot", "dual", "body", "camera")
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """What an estimator made of a run: its track, its steps (None if it has none) and what it cost.
 
-    ``told``: the same steps with all that the estimator says of them.
+    ``told``: the same steps with all that the estimator says of them; ``floors``: where it tells any.
     """
 
     track: Track
@@ -48,17 +48,19 @@ class Estimate:
     samples: int
     seconds: float
     told: Sequence["FootStepEstimate"] = ()
+    floors: Floors | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One row to be: a run, the place (left_foot, right_foot, body) and the method."""
+    """One row to be: a run, the place (left_foot, right_foot, body, camera) and the method."""
 
     run: Run
     kind: Kind
     place: str
     method: str
     name: str
+    smoothed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +77,10 @@ def methods_of(choice: str | None) -> tuple[str, ...]:
     """The methods to run: each kind's default, the one named, or all; ConfigError on an unknown name."""
     from pdr_engine.body.methods import DEFAULT
     from pdr_engine.foot import FootSettings
+    from proving_ground.evaluation.camera import METHODS as CAMERA_METHODS
 
     if choice is None:
-        return (FootSettings().method, DEFAULT)
+        return (FootSettings().method, DEFAULT, CAMERA_METHODS[0])
     known = tuple(dict.fromkeys(name for kind in KINDS for name in _known_to(kind)))
     if choice == ALL:
         return known
@@ -90,13 +93,27 @@ def _known_to(kind: Kind) -> tuple[str, ...]:
     """The methods that a kind's estimator has."""
     from pdr_engine.body.methods import METHODS as BODY_METHODS
     from pdr_engine.foot import METHODS
+    from proving_ground.evaluation.camera import METHODS as CAMERA_METHODS
+    from proving_ground.evaluation.dual import OWN_METHODS
 
-    return BODY_METHODS if kind == "body" else METHODS
+    by_kind = {"body": BODY_METHODS, "camera": CAMERA_METHODS, "dual": (*METHODS, *OWN_METHODS)}
+    return by_kind.get(kind, METHODS)
 
 
-def plan(runs: Sequence[Run], kind: Kind | None, methods: Sequence[str]) -> list[Task]:
-    """Every row to compute, in order: runs, then places, then methods; ConfigError if there is none."""
+def plan(
+    runs: Sequence[Run], kind: Kind | None, methods: Sequence[str], *, smoothed: bool = False
+) -> list[Task]:
+    """Every row to compute, in order: runs, then places, then methods; ConfigError if there is none.
+
+    ``smoothed``: tracks as known afterwards; only of two feet, for one alone has nothing to be corrected by.
+    """
     tasks = [task for run in runs for task in _tasks(run, kind or run.kind, methods)]
+    if smoothed:
+        tasks = [
+            replace(task, smoothed=True) for task in tasks if task.kind == "dual" and task.method != JOINT
+        ]
+        if not tasks:
+            raise ConfigError("--smoothed: nothing to smooth; there must be runs of two feet (kind dual)")
     if not tasks:
         found = sorted({kind or run.kind for run in runs})
         known = ", ".join(f"{one} ({', '.join(_known_to(one))})" for one in KINDS)
@@ -108,15 +125,14 @@ def plan(runs: Sequence[Run], kind: Kind | None, methods: Sequence[str]) -> list
 
 
 def _tasks(run: Run, kind: Kind, methods: Sequence[str]) -> Iterator[Task]:
-    if kind not in KINDS:
-        structlog.get_logger().warning("evaluate.no_estimator_yet", run=run.name, kind=kind)
-        return
     methods = [method for method in methods if method in _known_to(kind)]
-    if kind == "body":
+    if kind in (BODY, CAMERA):
         for method in methods:
-            yield Task(run, kind, BODY, method, run.name)
+            yield Task(run, kind, kind, method, run.name)
         return
     places = [place for place in FEET if place in run.imus]
+    if len(places) < len(FEET):
+        methods = [method for method in methods if method != JOINT]
     for place in places:
         name = run.name if len(places) == 1 else f"{run.name}/{place.removesuffix('_foot')}"
         for method in methods:
@@ -131,15 +147,21 @@ def evaluate_task(task: Task, align: Align) -> Evaluated:
     estimate = _estimate(task)
     truth = task.run.truth_of(BODY if task.place == FUSED else task.place)
     scored = score_track(estimate.track, truth, align, estimate.steps)
-    strides_true = true_strides(truth) if truth is not None and task.place in task.run.truth else None
+    has_strides = truth is not None and task.place in task.run.truth and task.place != CAMERA
+    strides_true = true_strides(truth) if truth is not None and has_strides else None
     return Evaluated(task, estimate, scored, _row(task, estimate, scored, strides_true))
 
 
 def _estimate(task: Task) -> Estimate:
-    if task.place == FUSED:
+    if task.place == FUSED and not task.smoothed and task.method != JOINT:
         return estimate_fused(task.run, task.method)
-    imu = task.run.imus[task.place]
-    return estimate_body(imu, task.method) if task.place == BODY else estimate_foot(imu, task.method)
+    if task.kind == "dual":
+        return estimate_fused_foot(task)
+    if task.place == CAMERA:
+        return estimate_camera(task.run)
+    if task.place == BODY:
+        return estimate_body(task.run, task.method)
+    return estimate_foot(task.run.imus[task.place], task.method)
 
 
 def _row(task: Task, estimate: Estimate, scored: Scored, strides_true: int | None) -> Row:
@@ -149,6 +171,7 @@ def _row(task: Task, estimate: Estimate, scored: Scored, strides_true: int | Non
         "method": task.method,
         "duration_s": task.run.duration_s,
         **asdict(scored.score),
+        "floors_right_pct": floors_right_pct(estimate.floors, task.run.truth_of(BODY)),
         "samples": estimate.samples,
         "us_per_sample": 1e6 * estimate.seconds / estimate.samples,
         "strides": estimate.strides,
@@ -189,19 +212,47 @@ def estimate_foot(imu: ImuSeries, method: str) -> Estimate:
     )
 
 
-def estimate_body(imu: ImuSeries, method: str) -> Estimate:
-    """The body-worn unit through its navigator, batch by batch as on the bus."""
+def estimate_body(run: Run, method: str) -> Estimate:
+    """The body-worn unit through its navigator, message by message as on the bus."""
     from pdr_engine.body.methods import settings_of
-    from proving_ground.evaluation.body import body_chain, body_track, walk_body
+    from proving_ground.evaluation.body import body_chain, body_floors, body_track, walk_body
 
-    walk = walk_body(imu, settings_of(method))
+    walk, imu = walk_body(run, settings_of(method)), run.imus[BODY]
     return Estimate(
         track=body_track(walk.steps, imu),
         steps=body_chain(walk.steps),
         strides=len(walk.steps),
         samples=len(imu.time_s),
         seconds=walk.seconds,
+        floors=body_floors(walk.steps),
     )
+
+
+def estimate_fused_foot(task: Task) -> Estimate:
+    """One of two feet as both together have it, or the body over them.
+
+    Steps (and so ``inside_95_pct`` and ``nees``) are the foot's own, as fusion is told them. A foot that never
+    joined the other walks by itself.
+    """
+    from pdr_engine.foot import FootSettings
+    from proving_ground.evaluation.dual import OWN_METHODS, between, fused_feet
+
+    fused = fused_feet(task.run, task.method, smoothed=task.smoothed)
+    if task.place == FUSED:
+        body = between(fused.tracks)
+        return Estimate(track=body, steps=None, strides=None, samples=fused.samples, seconds=fused.seconds)
+    method = FootSettings().method if task.method in OWN_METHODS else task.method
+    alone = estimate_foot(task.run.imus[task.place], method)
+    track = fused.tracks.get(task.place, alone.track)
+    return replace(alone, track=track, samples=fused.samples, seconds=fused.seconds)
+
+
+def estimate_camera(run: Run) -> Estimate:
+    """The camera's pairs through stereo odometry; a sample is a pair."""
+    from proving_ground.evaluation.camera import walk_camera
+
+    walked = walk_camera(run)
+    return Estimate(walked.track, walked.chain, None, len(walked.time_s), walked.seconds)
 
 
 def estimate_fused(run: Run, method: str) -> Estimate:
@@ -212,13 +263,17 @@ def estimate_fused(run: Run, method: str) -> Estimate:
     from fusion.config import FusionConfig
     from pdr_engine.config import PdrConfig
     from pdr_engine.foot import warm_up
+    from proving_ground.evaluation.dual import COUPLINGS, DEFAULT_COUPLING
     from proving_ground.inprocess import play_run, positions_of
 
     warm_up()
     feet = [place for place in FEET if place in run.imus]
-    pdr = convert({"places": feet, "foot": {"method": method}}, PdrConfig, where="--method")
+    foot = {} if method in COUPLINGS else {"foot": {"method": method}}
+    pdr = convert({"places": feet, **foot}, PdrConfig, where="--method")
     start = {"east_m": 0.0, "north_m": 0.0, "azimuth_deg": 90.0}
-    fusion = convert({"feet": feet, "gnss_sources": [], "start": start}, FusionConfig, where="fused")
+    boots_settings = {"coupling": COUPLINGS.get(method, DEFAULT_COUPLING)}
+    settings = {"feet": feet, "gnss_sources": [], "start": start, "boots": boots_settings}
+    fusion = convert(settings, FusionConfig, where="fused")
     boots = replace(run, imus={place: run.imus[place] for place in feet}, gnss=None)
     begin = time.thread_time()
     bus = play_run(boots, _IDENTITY, _ORIGIN, pdr, fusion, start_ns=0)

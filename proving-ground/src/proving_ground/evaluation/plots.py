@@ -1,4 +1,7 @@
-"""Pictures of evaluated runs: the track over the truth, and the error over time. One PNG a row."""
+"""Pictures of evaluated runs: the track over the truth, error and, where both know it, height over time.
+
+One PNG a row.
+"""
 
 import re
 from pathlib import Path
@@ -37,12 +40,15 @@ def save_plot(evaluated: Evaluated, folder: Path) -> Path:
     from matplotlib import pyplot as plt
 
     path = folder / f"{_file_name(evaluated)}.png"
+    places = "me;mh" if knows_height(evaluated) else "me"  # map, error, height
     with plt.style.context(STYLE):
-        figure, (map_axes, error_axes) = plt.subplots(
-            1, 2, figsize=_FIGURE_IN, layout="constrained", width_ratios=(1.25, 1.0)
+        figure, axes = plt.subplot_mosaic(
+            places, figsize=_FIGURE_IN, layout="constrained", width_ratios=(1.25, 1.0)
         )
-        draw_map(map_axes, evaluated)
-        draw_error(error_axes, evaluated)
+        draw_map(axes["m"], evaluated)
+        draw_error(axes["e"], evaluated)
+        if "h" in axes:
+            draw_height(axes["h"], evaluated)
         figure.savefig(path, dpi=_DPI)
         plt.close(figure)
     return path
@@ -102,6 +108,25 @@ def draw_error(axes: "Axes", evaluated: Evaluated) -> None:
         )
         axes.legend(loc="upper left")
     axes.set_ylim(bottom=0.0, top=max(1.15 * float(np.max(errors)), 0.05))
+
+
+def knows_height(evaluated: Evaluated) -> bool:
+    """Whether there are heights to compare."""
+    return evaluated.scored.score.height_rmse_m is not None
+
+
+def draw_height(axes: "Axes", evaluated: Evaluated) -> None:
+    """Heights of estimate and truth over time, from the first point compared."""
+    compared = evaluated.scored.compared
+    if compared is None:
+        return
+    truth, estimate = compared.truth_m[:, 2], compared.estimate_m[:, 2]
+    first = int(np.flatnonzero(np.isfinite(truth + estimate))[0])
+    axes.plot(compared.time_s, truth - truth[first], color=TRUTH, linewidth=2.6, alpha=0.45, label="truth")
+    axes.plot(compared.time_s, estimate - estimate[first], color=ESTIMATE, linewidth=1.2, label="estimate")
+    axes.set(xlabel="s", ylabel="height, m")
+    axes.grid(visible=True)
+    axes.legend(loc="best")
 
 
 def _headline(evaluated: Evaluated) -> str:

@@ -43,6 +43,7 @@ class Score:
     final_pct: float | None = None
     distance_error_pct: float | None = None
     height_final_m: float | None = None
+    height_rmse_m: float | None = None
     heading_drift_deg_per_min: float | None = None
     inside_95_pct: float | None = None
     nees: float | None = None
@@ -89,6 +90,7 @@ def _loop_score(compared: Compared, rigid: RigidFit) -> Score:
     return Score(
         final_m=float(plane_errors(compared, rigid)[-1]),
         height_final_m=_height_final(compared),
+        height_rmse_m=_height_rmse(compared),
     )
 
 
@@ -109,6 +111,7 @@ def _full_score(
         final_pct=100.0 * float(errors[-1]) / distance,
         distance_error_pct=100.0 * (estimated - distance) / distance,
         height_final_m=_height_final(compared),
+        height_rmse_m=_height_rmse(compared),
         heading_drift_deg_per_min=heading_drift(compared),
         inside_95_pct=honest.inside_95_pct if honest else None,
         nees=honest.nees if honest else None,
@@ -121,6 +124,13 @@ def _height_final(compared: Compared) -> float | None:
         compared.truth_m[-1, 2] - compared.truth_m[0, 2]
     )
     return abs(float(climb)) if math.isfinite(climb) else None
+
+
+def _height_rmse(compared: Compared) -> float | None:
+    """Of the heights where both are known, the same at the first of these points; None if there are none."""
+    error = compared.estimate_m[:, 2] - compared.truth_m[:, 2]
+    error = error[np.isfinite(error)]
+    return float(np.sqrt(np.mean((error - error[0]) ** 2))) if len(error) else None
 
 
 def heading_drift(compared: Compared) -> float | None:

@@ -10,6 +10,24 @@ from bootprint.errors import ConfigError
 
 EXIT_INTERRUPTED = 130
 _SCENARIO = "building-clearing"
+_PAGE_PORT = 8080
+
+
+Page = Annotated[
+    int | None,
+    typer.Option(
+        "--page",
+        metavar="PORT",
+        min=0,
+        max=65535,
+        help="Serve the command post's map there, 0 for any free port (default: 8080 or any, headless none).",
+    ),
+]
+
+
+def page_port(asked: int | None, *, headless: bool) -> int | None:
+    """Where the page is wanted: as asked, else at the usual port unless nobody looks."""
+    return _PAGE_PORT if asked is None and not headless else asked
 
 
 def register(app: typer.Typer) -> None:
@@ -35,6 +53,7 @@ def demo(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the simulated walks.")] = 1,
+    page: Page = None,
     report: Annotated[
         Path, typer.Option(help="Folder for result.json, report.html and the processes' logs.")
     ] = Path("out/demo"),
@@ -56,7 +75,13 @@ def demo(
     from proving_ground.exercises.squad import recorded_squad
 
     check_outputs(report, json_out)
-    how = Playing(report, speed=speed, duration_s=duration, headless=headless)
+    how = Playing(
+        report,
+        speed=speed,
+        duration_s=duration,
+        headless=headless,
+        page_port=page_port(page, headless=headless),
+    )
     exercise = prepare(_SCENARIO, seed, how) if data is None else recorded_squad(data)
     outcome = play(with_loss(exercise, loss), how)
     write_outcome(outcome, report, json_out)

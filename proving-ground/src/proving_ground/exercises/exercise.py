@@ -95,7 +95,8 @@ class Settings:
 class Exercise:
     """Who takes part, with everything they measure.
 
-    ``storeys_m`` are heights of the floors by level, ``plan`` outlines (k, 2) m on each of them, for maps.
+    ``storeys_m`` are heights of the floors by level, ``plan`` outlines (k, 2) m on each of them, for maps;
+    ``site`` the same and more as GeoJSON.
     """
 
     soldiers: tuple[Soldier, ...]
@@ -108,6 +109,7 @@ class Exercise:
     faults: tuple[Fault, ...] = ()
     settings: Settings = Settings()
     plan: Mapping[int, Sequence[FloatArray]] = field(default_factory=dict)
+    site: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def duration_s(self) -> float:

@@ -1,5 +1,6 @@
 """What an exercise's computers are told: realm.toml, the group key, a computer.toml each; also as structs."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,15 +16,17 @@ from proving_ground.exercises.exercise import Exercise, Soldier
 from sa_hub.keys import create_group_key
 from sa_hub.settings import HubSettings, check_settings
 
+PLAN = "plan.geojson"
 _WHERE = "exercise"
 
 
-@dataclass(frozen=True)
+@dataclass
 class Ports:
-    """UDP ports of loopback: each net's members by computer, and the net's own by name."""
+    """Ports of loopback: each net's members by computer, the net's own by name; TCP of the command post's page."""
 
     members: dict[str, dict[str, int]] = field(default_factory=dict)
     nets: dict[str, int] = field(default_factory=dict)
+    page: int | None = None
 
 
 def write_realm(folder: Path, exercise: Exercise) -> None:
@@ -45,6 +48,11 @@ def _fields(struct: Any) -> dict[str, Any]:
     return {name: getattr(struct, name) for name in struct.__struct_fields__}
 
 
+def write_plan(folder: Path, exercise: Exercise) -> None:
+    """``plan.geojson``: the buildings, for the command post's page."""
+    (folder / PLAN).write_text(json.dumps(exercise.site), encoding="utf-8")
+
+
 def write_computer(folder: Path, exercise: Exercise, computer: str, router: str, ports: Ports) -> None:
     """A computer's ``computer.toml`` in its own folder."""
     soldiers = {soldier.id: soldier for soldier in exercise.soldiers}
@@ -53,9 +61,17 @@ def write_computer(folder: Path, exercise: Exercise, computer: str, router: str,
         {
             **_common(computer, router),
             **(sections(exercise, soldiers[computer]) if computer in soldiers else {}),
-            "hub": hub_section(exercise, computer, ports),
+            "hub": hub_section(exercise, computer, ports) | _page(exercise, computer, ports),
         },
     )
+
+
+def _page(exercise: Exercise, computer: str, ports: Ports) -> dict[str, Any]:
+    """``[hub.page]`` of the command post, if its page is to be served, and the history that its timeline needs."""
+    if ports.page is None or computer != exercise.command_post:
+        return {}
+    plan = {"plan": f"../{PLAN}"} if exercise.site else {}
+    return {"page": {"port": ports.page, **plan}, "history": {}}
 
 
 def write_gateway(
@@ -88,7 +104,7 @@ def sections(exercise: Exercise, soldier: Soldier) -> dict[str, dict[str, Any]]:
     """``[pdr]`` and ``[fusion]`` of a soldier's computer."""
     feet = [place for place in soldier.run.imus if place.endswith("_foot")]
     fusion: dict[str, Any] = {
-        "feet": feet,
+        **({"feet": feet} if feet else {}),  # who has none is carried by the body
         "gnss_sources": ["gnss"] if soldier.run.gnss is not None else [],
         "start": soldier.start,
     }

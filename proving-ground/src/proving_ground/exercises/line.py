@@ -18,6 +18,7 @@ from bootprint.topics import Address, Identity, Qos
 from fusion.config import FusionConfig
 from fusion.engine import SUBJECTS as FUSION_SUBJECTS
 from fusion.engine import FusionCore
+from fusion.memory import SAVE_EVERY_NS, Saved
 from pdr_engine.config import PdrConfig
 from pdr_engine.engine import SUBJECTS as PDR_SUBJECTS
 from pdr_engine.engine import EngineCore
@@ -68,6 +69,7 @@ class _Player:
     def __init__(self, job: LineJob) -> None:
         self._job = job
         self._line = Line(job.identity.soldier)
+        self._saved: Saved | None = None  # what fusion has on its disk
         self._cores: dict[str, Core | None] = {name: self._build(name) for name in _SERVICES}
         self._cache: dict[Address, deque[Envelope]] = {}
         self._now_ns = job.start_ns
@@ -78,8 +80,8 @@ class _Player:
     def _build(self, service: str) -> Core:
         job = self._job
         if service == "fusion":
-            return FusionCore(job.fusion, job.identity, job.origin)
-        return EngineCore(job.pdr, job.identity)
+            return FusionCore(job.fusion, job.identity, job.origin, saved=self._saved)
+        return EngineCore(job.pdr, job.identity, job.origin)
 
     def _changes(self) -> Iterator[tuple[int, str, bool]]:
         """(time, service, runs from then on)."""
@@ -109,9 +111,15 @@ class _Player:
             for core in self._cores.values():
                 if core is not None:
                     self._pass_on(core.tick(self._next_tick_ns))
+            self._save()
             self._next_tick_ns += TICK_NS
         self._change(until_ns)
         self._now_ns = max(self._now_ns, until_ns)
+
+    def _save(self) -> None:
+        fusion = self._cores["fusion"]
+        if isinstance(fusion, FusionCore) and self._job.kills and self._now_ns % SAVE_EVERY_NS < TICK_NS:
+            self._saved = fusion.remembered()
 
     def _change(self, until_ns: int) -> None:
         while self._schedule and self._schedule[0][0] <= until_ns:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bootprint.processes import ProcessError
     from proving_ground.exercises.exercise import Exercise
     from proving_ground.exercises.result import Result
-    from proving_ground.exercises.stage import Stage
+    from proving_ground.exercises.stage import Play, Stage
     from proving_ground.exercises.usage import UsageMeter
 
 Mode = Literal["processes", "inprocess"]
@@ -27,7 +27,10 @@ _REFRESH_S = 0.5
 
 @dataclass(frozen=True)
 class Playing:
-    """How an exercise is to be played and shown; ``duration_s`` None is until the last walk has ended."""
+    """How an exercise is to be played and shown; ``duration_s`` None is until the last walk has ended.
+
+    ``page_port``: where the command post's page is wanted, 0 for anywhere; None is for no page.
+    """
 
     report: Path
     mode: Mode = "processes"
@@ -37,6 +40,7 @@ class Playing:
     serial: bool = False
     record: Path | None = None
     workers: int = 0
+    page_port: int | None = None
 
     @property
     def local_workers(self) -> int:
@@ -142,11 +146,11 @@ def progress_bars() -> Iterator[Callable[[str, float], None]]:
 def _in_processes(exercise: "Exercise", how: Playing) -> Outcome:
     from bootprint.processes import ProcessError
     from proving_ground.exercises.inprocess_play import SETTLE_S
-    from proving_ground.exercises.stage import Play, Stage
+    from proving_ground.exercises.stage import Stage
 
     length_s = exercise.duration_s + SETTLE_S if how.duration_s is None else how.duration_s
     fault: ProcessError | None = None
-    with Stop() as stop, Stage(exercise, Play(how.report, how.speed, how.serial, how.record)) as stage:
+    with Stop() as stop, Stage(exercise, _play_of(how)) as stage:
         runner = Runner(stage, length_s, stop, headless=how.headless)
         try:
             runner.run()
@@ -154,6 +158,12 @@ def _in_processes(exercise: "Exercise", how: Playing) -> Outcome:
             fault = error
         result = runner.result()
     return Outcome(result, fault, stopped=stop.is_set())
+
+
+def _play_of(how: Playing) -> "Play":
+    from proving_ground.exercises.stage import Play
+
+    return Play(how.report, how.speed, how.serial, how.record, how.page_port)
 
 
 class Runner:
@@ -180,6 +190,8 @@ class Runner:
         if self._stop.is_set():
             return
         console.print(f"{len(self._stage.processes.pids)} processes run, walks begin")
+        if self._stage.page_address is not None:
+            console.print(f"[bold]the command post's map: {self._stage.page_address}[/bold]")
         try:
             if self._headless or not console.is_terminal:
                 self._lines(console)

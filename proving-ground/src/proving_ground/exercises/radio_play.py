@@ -8,12 +8,13 @@ import hashlib
 import heapq
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Protocol
 
 from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
+from bootprint.config import Member
 from bootprint.geodesy import LocalFrame
-from bootprint.messages import Position
+from bootprint.messages import Fix, Position
 from bootprint.recording import Recorder
 from proving_ground.exercises.emulated_radio import Air
 from proving_ground.exercises.exercise import Exercise
@@ -39,6 +40,16 @@ class _Arrival:
     deliver: Callable[[], None] = field(compare=False)
 
 
+class Watcher(Protocol):
+    """Looks on while hubs are played, and sets the pace."""
+
+    def before(self, now_ns: int) -> bool:
+        """A step is about to be done; False ends the play."""
+
+    def kept(self, computer: str, envelopes: list[Envelope]) -> None:
+        """What a computer's hub has said."""
+
+
 class RadioPlay:
     """All computers' hubs of an exercise from ``start_ns`` to ``end_ns``; `run` once."""
 
@@ -49,7 +60,9 @@ class RadioPlay:
         start_ns: int,
         end_ns: int,
         recorder: Recorder | None = None,
+        watcher: Watcher | None = None,
     ) -> None:
+        self._watcher = watcher
         self._exercise = exercise
         self._start_ns = start_ns
         self._end_ns = end_ns
@@ -105,6 +118,8 @@ class RadioPlay:
         position = next(self._positions, None)
         steps = range(self._start_ns, self._end_ns + 1, STEP_NS)
         for index, now_ns in enumerate(steps):
+            if self._watcher is not None and not self._watcher.before(now_ns):
+                return
             waiting: list[_Arrival] = self._frames_until(now_ns)
             while position is not None and position[0] <= now_ns:
                 waiting.append(self._position_arrival(*position))
@@ -115,6 +130,16 @@ class RadioPlay:
             if index % 100 == 0:
                 on_progress(index / len(steps))
         on_progress(1.0)
+
+    def hand(self, computer: str, envelope: Envelope, at_ns: int) -> list[Envelope]:
+        """A message on a computer's own bus, from outside the exercise; what its hub says to it."""
+        hub = self._hubs[computer]
+        return [] if hub is None else self._keep(computer, hub.handle(envelope), at_ns)
+
+    def place(self, computer: str, fix: Fix, member: Member, at_ns: int) -> list[Envelope]:
+        """A person says on a computer where somebody else is."""
+        hub = self._hubs[computer]
+        return [] if hub is None else self._keep(computer, hub.place(fix, member), at_ns)
 
     def _position_arrival(self, at_ns: int, order: int, computer: str, position: Position) -> _Arrival:
         def deliver() -> None:
@@ -163,12 +188,15 @@ class RadioPlay:
                 now_ns += round(float(fault.details["jump_s"]) * NS_PER_S)
         return now_ns
 
-    def _keep(self, computer: str, outputs: Iterable[Envelope], at_ns: int) -> None:
-        heard = self.heard[computer]
-        for envelope in outputs:
+    def _keep(self, computer: str, outputs: Iterable[Envelope], at_ns: int) -> list[Envelope]:
+        heard, envelopes = self.heard[computer], list(outputs)
+        for envelope in envelopes:
             heard.take(envelope, at_ns, self._frame)
             if self._recorder is not None:
                 self._recorder.write(envelope, at_ns)
+        if self._watcher is not None and envelopes:
+            self._watcher.kept(computer, envelopes)
+        return envelopes
 
 
 def _by_time(lines: Mapping[str, Line], computers: Sequence[str]) -> Iterator[tuple[int, int, str, Position]]:

@@ -7,7 +7,7 @@ import typer
 
 from bootprint.commands.options import Json, write_json
 from bootprint.errors import ConfigError
-from proving_ground.exercises.demo import EXIT_INTERRUPTED, check_options
+from proving_ground.exercises.demo import EXIT_INTERRUPTED, Page, check_options, page_port
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -63,6 +63,7 @@ def run(
         typer.Option(metavar="OUT.mcap", help="Record every message of every computer, and the truth."),
     ] = None,
     headless: Annotated[bool, typer.Option("--headless", help="No live table; a line now and then.")] = False,
+    page: Page = None,
     workers: Workers = 0,
     json_out: Json = None,
 ) -> None:
@@ -90,6 +91,7 @@ def run(
         serial=serial is not None,
         record=record,
         workers=workers,
+        page_port=page_port(page, headless=headless),
     )
     outcome = play(with_settings(prepare(scenario, seed, how), settings), how)
     write_outcome(outcome, report, json_out)

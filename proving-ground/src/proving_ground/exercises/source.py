@@ -40,8 +40,10 @@ def open_exercise(
 def _exercise(scenario: "Scenario", seed: int, soldiers: tuple[Soldier, ...], duration_s: float) -> Exercise:
     """What the scenario's own `build` makes, of soldiers who are there already; with outlines for maps."""
     from proving_ground.scenario.build import exercise_of
+    from proving_ground.scenario.geojson import write_plan
 
-    return replace(exercise_of(scenario, seed, soldiers, duration_s), plan=_plan(scenario))
+    site = write_plan(scenario.site, scenario.file.site, scenario.file.origin)
+    return replace(exercise_of(scenario, seed, soldiers, duration_s), plan=_plan(scenario), site=site)
 
 
 def check_scenario(scenario: str) -> None:

@@ -27,12 +27,13 @@ from bootprint.stopping import Stop
 from bootprint.zenoh_bus import EmbeddedRouter
 from pdr_engine.foot import warm_up
 from proving_ground.exercises.emulated_radio import EmulatedNet
-from proving_ground.exercises.exercise import REALM, Exercise, Soldier
+from proving_ground.exercises.exercise import COMMAND_POST_ROLE, REALM, Exercise, Soldier
 from proving_ground.exercises.exercise_files import (
     Ports,
     check_exercise,
     write_computer,
     write_gateway,
+    write_plan,
     write_realm,
 )
 from proving_ground.exercises.observer import Observers
@@ -46,8 +47,7 @@ SOLDIER_SERVICES = ("pdr-engine", "fusion", "sa-hub")
 POST_SERVICES = ("sa-hub",)
 _READY_TIMEOUT_S = 120.0  # for one process
 _AT_ONCE_PER_PROCESSOR = 3
-BUSY_BEAT_S = 0.1
-_BUSY_COMPUTERS = 6  # of soldiers, on each processor of this machine
+_BUSY_BEATS_S = ((15, 0.2), (6, 0.1))  # from so many computers on each processor of this machine
 # Host seconds for the gateways to start before the walks do: a base, each one's imports, each second of a unit.
 _LEAD_S, _LEAD_PER_GATEWAY_S, _LEAD_PER_PLAYED_S = 5.0, 1.0, 2e-4
 _LEAD_TRIES = (1.0, 3.0, 9.0)
@@ -64,12 +64,16 @@ class StageError(BootprintError):
 
 @dataclass(frozen=True)
 class Play:
-    """How it is played: files below ``folder``; ``serial``: sensors by pseudo-terminal; ``record``: a file."""
+    """How it is played: files below ``folder``; ``serial``: sensors by pseudo-terminal; ``record``: a file.
+
+    ``page_port``: where the command post's page is wanted, 0 for anywhere; None is for no page.
+    """
 
     folder: Path
     speed: float = 1.0
     serial: bool = False
     record: Path | None = None
+    page_port: int | None = None
 
 
 class Stage:
@@ -84,6 +88,7 @@ class Stage:
         self.clock = ScaledClock(play.speed, time.time_ns())
         self.frame = LocalFrame(exercise.origin)
         self.start_ns = 0
+        self.page_address: str | None = None
         self.processes = ProcessGroup()
         self.nets: dict[str, EmulatedNet] = {}
         self.observers: Observers
@@ -109,6 +114,8 @@ class Stage:
         self._start_routers()
         ports = self._start_nets()
         write_realm(self._play.folder, self.exercise)
+        if ports.page is not None and self.exercise.site:
+            write_plan(self._play.folder, self.exercise)
         for computer in self.exercise.computers:
             write_computer(self._play.folder, self.exercise, computer, self._endpoints[computer], ports)
         if self._play.record is not None:
@@ -157,7 +164,21 @@ class Stage:
             self._stack.callback(emulated.close)
             self.nets[name] = emulated
             ports.nets[name] = emulated.port
+        ports.page = self._page_port()
         return ports
+
+    def _page_port(self) -> int | None:
+        """The port of the command post's page: the one that was asked for, or any if somebody has that."""
+        wanted = self._play.page_port
+        if wanted is None or self.exercise.hub_role(self.exercise.command_post) != COMMAND_POST_ROLE:
+            return None
+        port = (
+            wanted
+            if wanted and _is_free(wanted, socket.SOCK_STREAM)
+            else free_ports(1, socket.SOCK_STREAM)[0]
+        )
+        self.page_address = f"http://127.0.0.1:{port}/"
+        return port
 
     # -- processes --------------------------------------------------------------------------------------------
 
@@ -195,7 +216,7 @@ class Stage:
     def _beat_s(self) -> float:
         """As often as one soldier's computer looks at its bus, if the machine has the processors for it."""
         of_each = len(self.exercise.computers) / (os.cpu_count() or 1)
-        return BUSY_BEAT_S if of_each > _BUSY_COMPUTERS else DEFAULT_BEAT_S
+        return next((beat_s for computers, beat_s in _BUSY_BEATS_S if of_each > computers), DEFAULT_BEAT_S)
 
     def wait_ready(self, stop: Stop, on_progress: OnProgress = lambda _done, _of: None) -> None:
         """Start all services but the gateways; StageError names those that do not come up."""

@@ -32,7 +32,7 @@ def step_arcs(leg: Leg, pace: Pace) -> FloatArray:
     """Length walked when each step falls, (n,); the last step joins the other foot."""
     route = Route(leg.points_m)
     if leg.gait == "stairs":
-        counts = stair_steps(leg.points_m, pace.length_m).astype(int)
+        counts = stair_steps(leg, pace.length_m).astype(int)
         pieces = [
             begin + (end - begin) * np.arange(1, count + 1) / count
             for begin, end, count in zip(route.arc_m[:-1], route.arc_m[1:], counts, strict=True)

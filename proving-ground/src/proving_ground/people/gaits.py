@@ -14,7 +14,6 @@ from proving_ground.people.legs import FloatArray, GaitName, Leg
 from proving_ground.people.person import Person
 
 ShapeName = Literal["walk", "run", "side_step", "stairs_up", "stairs_down"]
-RISER_M = 0.16
 RUN_HZ_PER_M_S = 0.2
 RISER_AT_MOST_M = 0.23
 _STAIR_PERIOD_S = {True: 0.48, False: 0.44}  # a step up, a step down
@@ -81,18 +80,18 @@ def _stair_pace(person: Person, leg: Leg) -> Pace:
     period_s = _STAIR_PERIOD_S[rise >= 0.0] * np.sqrt(person.leg_length_m / 0.92)
     length_m = np.sqrt(person.walk_ratio_m_s * person.walk_speed_m_s) * 0.8
     if leg.speed_m_s is not None:
-        period_s = _horizontal_m(leg.points_m) / leg.speed_m_s / stair_steps(leg.points_m, length_m).sum()
+        period_s = _horizontal_m(leg.points_m) / leg.speed_m_s / stair_steps(leg, length_m).sum()
     shape: ShapeName = "stairs_up" if rise >= 0.0 else "stairs_down"
     return Pace(shape, float(length_m), float(period_s), 1.3 if rise >= 0.0 else 2.2)
 
 
-def stair_steps(points_m: FloatArray, length_m: float) -> FloatArray:
+def stair_steps(leg: Leg, length_m: float) -> FloatArray:
     """Steps on each piece of a stair's way (k − 1,): one a riser where it climbs, of this length on landings."""
-    run = np.linalg.norm(np.diff(points_m[:, :2], axis=0), axis=1)
-    rise = np.abs(np.diff(points_m[:, 2]))
-    risers = np.maximum(np.round(rise / RISER_M), np.ceil(rise / RISER_AT_MOST_M))
+    run = np.linalg.norm(np.diff(leg.points_m[:, :2], axis=0), axis=1)
+    rise = np.abs(np.diff(leg.points_m[:, 2]))
+    risers = np.maximum(np.round(rise / leg.riser_m), np.ceil(rise / RISER_AT_MOST_M))
     flat = np.maximum(1.0, np.round(run / length_m))
-    return np.asarray(np.where(rise > 0.5 * RISER_M, np.maximum(risers, 1.0), flat))
+    return np.asarray(np.where(rise > 0.5 * leg.riser_m, np.maximum(risers, 1.0), flat))
 
 
 def _horizontal_m(points_m: FloatArray) -> float:

@@ -45,7 +45,8 @@ class Leg:
     lying and turning; (2, 3) for a lift, from and to. ``duration_s``: of standing, kneeling, lying (required), of a
     lift's ride or a turn (None: as long as it needs). ``speed_m_s``: None is the person's own for the gait.
     ``facing_rad``: yaw of the body, counter-clockwise from east, where it is not the direction of motion; for a
-    turn the yaw to turn to. A travelling leg starts and ends standing, the feet side by side.
+    turn the yaw to turn to. ``riser_m``: about how high the steps of stairs are. A travelling leg starts and ends
+    standing, the feet side by side.
     """
 
     gait: GaitName
@@ -53,6 +54,7 @@ class Leg:
     duration_s: float | None = None
     speed_m_s: float | None = None
     facing_rad: float | None = None
+    riser_m: float = 0.16
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points_m", np.atleast_2d(np.asarray(self.points_m, dtype=np.float64)))
@@ -80,8 +82,8 @@ def _trouble(leg: Leg) -> str | None:
         return "needs duration_s"
     if leg.gait == "turn" and leg.facing_rad is None:
         return "needs facing_rad, the yaw to turn to"
-    if any(value is not None and not value > 0.0 for value in (leg.duration_s, leg.speed_m_s)):
-        return "duration_s and speed_m_s must be above zero"
+    if any(value is not None and not value > 0.0 for value in (leg.duration_s, leg.speed_m_s, leg.riser_m)):
+        return "duration_s, speed_m_s and riser_m must be above zero"
     return None
 
 

@@ -2,10 +2,10 @@
 
 What comes too late to be put in order follows one rule a kind, and is counted:
 
-- a **FootStep** still happened: it is composed at once, onto what the foot has become meanwhile;
+- a **FootStep** or **BodyStep** still happened: it is composed at once, onto what the foot has become meanwhile;
 - a **Fix** is a person's word: it is taken at once, the less sure by what may have been walked since;
 - a **GnssFix** is carried along by what the feet have walked since, if that is remembered, else dropped;
-- a **FootPose** is dropped: the next one comes soon.
+- a **FootPose**, **Pressure** or **CameraMotion** is dropped: the next one comes soon.
 
 A position at t is published when everything up to t + ``lookahead_s`` has been taken in, so that it lies between
 two foot poses instead of up to a tenth of a second behind. So it depends on the messages alone, not on when ticks
@@ -19,15 +19,34 @@ from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.config import Origin
 from bootprint.figures import Figures
-from bootprint.messages import Fix, FootPose, FootStep, GnssFix, Message, Mode
+from bootprint.messages import (
+    BodyStep,
+    CameraMotion,
+    Fix,
+    FootPose,
+    FootStep,
+    GnssFix,
+    Message,
+    Mode,
+    Pressure,
+)
 from bootprint.topics import Address, Identity
 from fusion.config import FusionConfig
 from fusion.estimator import Estimator
+from fusion.memory import Moment, Saved, age_in_words, go_on, is_of_now, remember
 from fusion.output import Publisher, horizontal_sigma_m
 from fusion.pulse import LivePulse, ReplayPulse
 from fusion.reorder import Arrival, Promise, ReorderBuffer, Waiting
 
-SUBJECTS = ("foot_step", "foot_pose", "gnss", "fix")  # at one time in this order: a step before its own poses
+SUBJECTS = (
+    "foot_step",
+    "foot_pose",
+    "gnss",
+    "fix",
+    "pressure",
+    "body_step",
+    "camera_motion",
+)  # at one time in this order: a step before its own poses
 SOURCE = "fusion"
 _LONGEST_LEAP_NS = 60 * NS_PER_S  # after a longer hole in time the positions between are not made up
 
@@ -36,7 +55,13 @@ class FusionCore:
     """One soldier's fusion; pure: the same messages give the same positions."""
 
     def __init__(
-        self, config: FusionConfig, identity: Identity, origin: Origin, *, patient: bool = False
+        self,
+        config: FusionConfig,
+        identity: Identity,
+        origin: Origin,
+        *,
+        patient: bool = False,
+        saved: Saved | None = None,
     ) -> None:
         self.counters: Counter[str] = Counter()
         self.estimator = Estimator(config, origin, self.counters)
@@ -48,11 +73,16 @@ class FusionCore:
         self._lookahead_ns = round(config.lookahead_s * NS_PER_S)
         self._stance_delay_ns = round(config.stance_delay_s * NS_PER_S)
         self._next_ns: int | None = None  # the next position's time
+        self._saved = saved  # until the first message
+        self._refusal = ""
         self._apply: dict[str, Callable[[str, Message], None]] = {
             "foot_step": self._step,
             "foot_pose": self._pose,
             "gnss": self._gnss,
             "fix": self._fix,
+            "pressure": self._pressure,
+            "body_step": self._body_step,
+            "camera_motion": self._camera_motion,
         }
 
     def handle(self, envelope: Envelope) -> Iterable[Envelope]:
@@ -62,6 +92,9 @@ class FusionCore:
             self.counters["unknown_sources"] += 1
             return []
         self.counters[f"{address.subject}_messages"] += 1
+        if self._is_had(address, message):
+            self.counters["duplicate_steps"] += 1
+            return []
         source = _source(address.subject, address.source)
         arrival = self._buffer.push(source, message, self._promise(address, message))
         if arrival is Arrival.LATE:
@@ -101,7 +134,7 @@ class FusionCore:
 
     def _complaints(self, mode: Mode) -> list[str]:
         """What somebody should look after, in words."""
-        words = []
+        words = [self._refusal] if self._refusal else []
         if self.estimator.satellites.is_mistimed:
             words.append("most satellite fixes are stamped too late or too far ahead")
         if mode == "unplaced" and self.counters["start_refused"]:
@@ -112,6 +145,26 @@ class FusionCore:
 
     def _is_known(self, address: Address) -> bool:
         return not address.subject.startswith("foot_") or address.source in self._config.feet
+
+    def _is_had(self, address: Address, message: Message) -> bool:
+        """Whether this is a step that was taken before, perhaps by the process before this one."""
+        if not address.subject.startswith(("foot_", "camera_")):
+            return False
+        if self._saved is not None:
+            self._go_on(self._saved, message.time_ns)
+            self._saved = None
+        return isinstance(message, FootStep) and self.estimator.boots.has_had(address.source, message)
+
+    def _go_on(self, saved: Saved, time_ns: int) -> None:
+        """Go on from what was saved, if it is of now."""
+        if not is_of_now(saved, time_ns, self._config):
+            self.counters["memory_refused"] += 1
+            self._refusal = f"saved state not gone on from: it is {age_in_words(saved, time_ns)}"
+            return
+        self.estimator.begin(saved.time_ns)
+        go_on(self.estimator, saved)
+        self._next_ns, self._publisher.sequence = saved.next_ns, saved.sequence
+        self.counters["memory_gone_on_from"] += 1
 
     def _promise(self, address: Address, message: Message) -> Promise | None:
         """A pose tells that no step earlier than itself is still to come, but for the stance detector's delay."""
@@ -124,8 +177,8 @@ class FusionCore:
         _, subject, name = source.split("/", 2)
         self.counters[f"late_{subject}"] += 1
         late_s = (self._buffer.low_ns - message.time_ns) / NS_PER_S
-        if subject == "foot_step":
-            self._step(name, message)
+        if subject in ("foot_step", "body_step"):
+            self._apply[subject](name, message)
         elif isinstance(message, Fix):
             self.estimator.fix(message, late_s)
         elif isinstance(message, GnssFix):
@@ -147,6 +200,18 @@ class FusionCore:
         if isinstance(message, Fix):
             self.estimator.fix(message)
 
+    def _pressure(self, _: str, message: Message) -> None:
+        if isinstance(message, Pressure):
+            self.estimator.pressure(message)
+
+    def _body_step(self, _: str, message: Message) -> None:
+        if isinstance(message, BodyStep):
+            self.estimator.body_step(message)
+
+    def _camera_motion(self, name: str, message: Message) -> None:
+        if isinstance(message, CameraMotion):
+            self.estimator.camera_motion(name, message)
+
     # --- out ---------------------------------------------------------------------------------------------------
 
     def _drain(self) -> Iterator[Envelope]:
@@ -162,6 +227,13 @@ class FusionCore:
             self._next_ns = -(-waiting.time_ns // self._period_ns) * self._period_ns
         _, subject, name = waiting.source.split("/", 2)
         self._apply[subject](name, waiting.message)
+
+    def remembered(self) -> Saved | None:
+        """What a restart could go on from; None before the soldier is placed."""
+        if self._next_ns is None:
+            return None
+        moment = Moment(self._buffer.low_ns, self._next_ns, self._publisher.sequence)
+        return remember(self.estimator, self._config, self._address.soldier, moment)
 
     def _due(self, before_ns: int) -> Iterator[Envelope]:
         """The positions of all grid times before ``before_ns``."""

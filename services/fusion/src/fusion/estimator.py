@@ -12,18 +12,27 @@ import numpy as np
 from bootprint.clock import NS_PER_S
 from bootprint.config import Origin
 from bootprint.geodesy import LocalFrame, yaw_of_azimuth
-from bootprint.messages import Fix, FootPose, FootStep, GnssFix, Mode, Vector3
+from bootprint.messages import BodyStep, CameraMotion, Fix, FootPose, FootStep, GnssFix, Pressure, Vector3
+from fusion import going
 from fusion.alignment import Walk
+from fusion.body_track import BodyTrack
 from fusion.boots import Boots
+from fusion.camera import Camera
+from fusion.carriers import Carriers
+from fusion.coasting import Coasting
 from fusion.config import FusionConfig
 from fusion.feet import Foot
-from fusion.filter import Innovation, Measurement
-from fusion.models import body, gnss
-from fusion.output import Estimate, horizontal_sigma_m
+from fusion.filter import Measurement
+from fusion.heights import Heights
+from fusion.models import body
+from fusion.output import Estimate
 from fusion.placement import UNKNOWN_UP_SIGMA_M, HeadingHint, Place, Placement, known_point
+from fusion.protection import Protection, Protector
+from fusion.satellite_aid import SatelliteAid
 from fusion.satellites import SatellitePosition, Satellites
-from fusion.state import Array
+from fusion.state import Array, xyz
 
+_BOOTS_AWAITED_NS = 3 * NS_PER_S  # so long a body's steps wait for the boots to speak
 _DEFAULT_AZIMUTH_SIGMA_RAD = math.radians(10.0)  # of a fix that names an azimuth but not how sure
 
 
@@ -36,10 +45,17 @@ class Estimator:
         self._counters = counters
         self.boots = Boots(config, counters)
         self.satellites = Satellites(config.gnss, origin, counters)
+        self._aid = SatelliteAid(config, self.satellites, counters)
+        self._body = BodyTrack(config.body, counters)
+        self._camera = Camera(self.boots, config, counters)
+        self._coasting = Coasting(config.silence)
+        self._carriers = Carriers(config.silence, self.satellites, self._body)
+        self._heights = Heights(config, self._aid.shadows, counters)
+        self._protector = Protector(self._aid.shadows)
         self.placement = Placement(config.align, config.gnss)
         self.placed = False
+        self._without_boots = False
         self._hint: HeadingHint | None = None  # a direction to walk off in, given when already placed
-        self._coasted_m2 = 0.0  # variance already added to the state in this silence
         self._begun_ns = 0
         self._start = config.start  # until the first step
 
@@ -48,6 +64,10 @@ class Estimator:
     def begin(self, time_ns: int) -> None:
         """The first message has this stamp."""
         self._begun_ns = time_ns
+
+    def go_on(self) -> None:
+        """The boots go on from a placed walk: its start is long past."""
+        self.placed, self._start = True, None
 
     def _take_start(self, first: FootStep) -> None:
         """The configured start holds where the boots begin; who joins a walk that is under way is elsewhere."""
@@ -66,12 +86,19 @@ class Estimator:
     def step(self, place: str, step: FootStep) -> None:
         """A foot has made a step."""
         self._take_start(step)
+        self._body.take_back(self.boots, self._aid.boots, step)
+        self._camera.take_back(place, step)
         foot = self.boots.step(place, step)
+        self._aid.step(place, step)
+        self._heights.step(self.boots, place, step)
         if foot is None:
             return
-        self._coasted_m2 = 0.0
-        if foot is not self.boots.reference:
-            return
+        self._coasting.over()
+        if foot is self.boots.reference:
+            self._follow_walk()
+
+    def _follow_walk(self) -> None:
+        """Whose track stands for the walk has moved."""
         for hint in (self.placement.hint, self._hint):
             if hint is not None:
                 hint.go(self.boots.track_point(), self._config.align)
@@ -84,11 +111,42 @@ class Estimator:
     def pose(self, place: str, pose: FootPose) -> None:
         """A foot is somewhere between two steps."""
         self.boots.pose(place, pose)
-        self._coasted_m2 = 0.0
+        self._aid.pose(place, pose)
+        self._coasting.over()
+
+    def camera_motion(self, source: str, motion: CameraMotion) -> None:
+        """A camera has moved."""
+        step = self._camera.take(source, motion)
+        if self.boots.standing_in(motion.time_ns):
+            self._aid.forget()  # shadows have no camera: they stay behind
+        if step is None:
+            return
+        self._coasting.over()
+        if self._camera.is_reference:
+            self._take_start(step)
+            self._follow_walk()
+
+    def body_step(self, step: BodyStep) -> None:
+        """The body-worn unit has made a step."""
+        if self.boots.reference is None and step.time_ns - self._begun_ns > _BOOTS_AWAITED_NS:
+            self.boots.adopt(step.start_time_ns)
+            self._start_without_boots(step.start_time_ns)
+        self._body.step(self.boots, self._aid.boots, step)
+
+    def _start_without_boots(self, time_ns: int) -> None:
+        if self._start is not None:
+            self.placement.observe(known_point(self._start, self._frame, time_ns))
+        self._start, self._without_boots = None, True
+        self._try_placing()
+
+    def pressure(self, pressure: Pressure) -> None:
+        """A barometer has measured."""
+        self._heights.pressure(self.boots, pressure, outdoors=bool(self.satellites.fresh(pressure.time_ns)))
 
     def gnss(self, source: str, fix: GnssFix, late_s: float = 0.0) -> None:
         """A receiver has a solution; one that comes late is carried along by the feet, if they remember."""
-        moved = np.zeros(3) if late_s <= 0.0 else self._moved_within(late_s, fix.time_ns)
+        remembered = late_s <= self._config.gnss.late_s
+        moved = np.zeros(3) if late_s <= 0.0 else self.boots.moved_since(fix.time_ns) if remembered else None
         self.satellites.note_stamp(usable=moved is not None)
         if moved is None:
             self._counters["gnss_too_late"] += 1
@@ -97,21 +155,18 @@ class Estimator:
         if position is None:
             return
         if late_s > 0.0:
-            position = self.satellites.late(position, _xyz(moved) if self.placed else (0.0, 0.0, 0.0), late_s)
+            position = self.satellites.late(position, xyz(moved) if self.placed else (0.0, 0.0, 0.0), late_s)
         if self.placed:
             self._correct_by(position)
         elif position.sigma_m > self._config.gnss.placement_accuracy_m:
             self._counters["gnss_too_coarse_to_place"] += 1
         else:
             self.satellites.placed_by(position)
-            local = _xyz(np.array(self.boots.track_point()) - moved)
+            local = xyz(np.array(self.boots.track_point()) - moved)
             self.placement.observe(
                 Place(fix.time_ns, position.enu, position.sigma_m, position.up_sigma_m, local, source)
             )
             self._try_placing()
-
-    def _moved_within(self, late_s: float, since_ns: int) -> Array | None:
-        return self.boots.moved_since(since_ns) if late_s <= self._config.gnss.late_s else None
 
     def fix(self, fix: Fix, late_s: float = 0.0) -> None:
         """A person says where the soldier is; one that comes late is the less sure by what may have been walked."""
@@ -144,14 +199,17 @@ class Estimator:
     # --- placing and correcting --------------------------------------------------------------------------------
 
     def _try_placing(self) -> None:
-        move = self.placement.final
+        move = self.placement.northward if self._without_boots else self.placement.final
         if move is not None and self.boots.reference is not None:
             self.boots.move(move)
+            self._camera.note_move(move)
             self.placed = True
+            self._protector.know(move.target)
             self._counters["placed"] += 1
 
     def _turn_to(self, hint: HeadingHint) -> None:
         """A placed soldier has walked off in a named direction: correct the yaw of the foot that was watched."""
+        self._aid.forget()
         foot = self.boots.reference
         if foot is None:
             return
@@ -163,11 +221,15 @@ class Estimator:
 
     def _believe(self, place: Place) -> None:
         """A person's word is not gated: where it contradicts the estimate, the estimate was not that sure."""
+        self._aid.forget()
+        self._body.placed()
+        self._protector.know(place.enu)
         stands = self.boots.stands(place.time_ns)
         residual = np.array(place.enu) - body.position(self.boots.filter.state, stands)
         axes = 2 if place.up_sigma_m is None else 3
+        expected = np.diag(self._covariance(self.boots.alive(place.time_ns)))
         surprise = np.zeros(3)
-        surprise[:axes] = residual[:axes] ** 2
+        surprise[:axes] = np.maximum(0.0, residual**2 - expected)[:axes]
         self.boots.filter.widen_together(np.diag(surprise))
         noise = np.diag([place.sigma_m**2, place.sigma_m**2, (place.up_sigma_m or UNKNOWN_UP_SIGMA_M) ** 2])
         jacobian = body.position_jacobian(self.boots.filter.state, stands)
@@ -176,44 +238,16 @@ class Estimator:
         )
 
     def _correct_by(self, position: SatellitePosition) -> None:
-        self._coast(position.time_ns)
-        innovation = self._correct_axes(position, slice(0, 2), gnss.noise(position.sigma_m, None))
-        self.satellites.judge(position, innovation)
-        if innovation.accepted and position.up_sigma_m is not None:
-            height = self._correct_axes(position, slice(2, 3), np.array([[position.up_sigma_m**2]]))
-            self._counters["gnss_height_rejected"] += not height.accepted
-
-    def _correct_axes(self, position: SatellitePosition, axes: slice, noise: Array) -> Innovation:
-        stands = self.boots.stands(position.time_ns)
-        state = self.boots.filter.state
-        return self.boots.correct(
-            Measurement(
-                "gnss",
-                (np.array(position.enu) - body.position(state, stands))[axes],
-                body.position_jacobian(state, stands)[axes],
-                noise * position.inflation,
-                gate_noise=noise,
-                gate_probability=self._config.gnss.gate_probability,
-            )
-        )
-
-    def _coast(self, now_ns: int) -> None:
-        """Own up in the state to what silent feet may have walked, before a satellite fix is compared with it."""
-        variance = self._coasting_m2(self.boots.silent_s(now_ns))
-        if variance > self._coasted_m2:
-            self.boots.filter.widen_together((variance - self._coasted_m2) * np.eye(3))
-            self._coasted_m2 = variance
-
-    def _coasting_m2(self, silent_s: float | None) -> float:
-        silence = self._config.silence
-        if silent_s is None or silent_s <= silence.coasting_s:
-            return 0.0
-        return (silence.drift_m_s * silent_s) ** 2
+        self._coasting.own_up(self.boots, position.time_ns)
+        self._body.corrected(self.satellites.silent_s(position.time_ns))
+        self.boots = self._aid.correct(self.boots, position)
+        self._camera.follow(self.boots)
 
     def shift(self, by_ns: int) -> None:
         """The boots' clock has been set: all that was remembered by the old one moves along."""
         self._begun_ns += by_ns
-        for part in (self.boots, self.satellites, self.placement):
+        self._aid.forget()
+        for part in (self.boots, self._camera, self.satellites, self.placement, self._heights):
             part.shift(by_ns)
 
     # --- what is asked -----------------------------------------------------------------------------------------
@@ -226,20 +260,29 @@ class Estimator:
         if known is None:
             return self._unplaced(now_ns, silent_s, alive)
         enu, covariance, turn = known
-        covariance = covariance + max(0.0, self._coasting_m2(silent_s) - self._coasted_m2) * np.eye(3)
+        covariance = covariance + self._coasting.pending_m2(silent_s) * np.eye(3)
+        dead_s = (now_ns - self._begun_ns) / NS_PER_S if silent_s is None else silent_s
         moving = silent_s is not None and silent_s <= self._config.silence.coasting_s
-        velocity, speed, course_sigma = self._motion(alive, turn) if moving else ((0.0, 0.0, 0.0), 0.0, None)
+        velocity, speed, course_sigma = (
+            going.motion(self.boots, alive, turn) if moving else ((0.0, 0.0, 0.0), 0.0, None)
+        )
         return Estimate(
-            mode=self._mode(now_ns, silent_s, covariance),
+            mode=self._carriers.mode(self.boots, now_ns, dead_s, covariance),
             enu=enu,
             covariance=covariance,
             velocity=velocity,
             speed_m_s=speed,
             course_sigma_rad=course_sigma,
-            motion=self.boots.motion(now_ns) if moving else "unknown",
-            sources=self._sources(now_ns, alive if moving else []),
-            rejected=self.satellites.refused(now_ns),
+            motion=going.motion_class(self.boots, now_ns) if moving else "unknown",
+            sources=self._carriers.sources(self.boots, now_ns, alive if moving else []),
+            rejected=(*self.boots.refused, *self.satellites.refused(now_ns)),
+            rejections=dict.fromkeys(self.boots.refused, "diverged") | self.satellites.why_refused(now_ns),
+            protection=self._protection(now_ns, enu, covariance) if self.placed else None,
         )
+
+    def _protection(self, now_ns: int, enu: Vector3, covariance: Array) -> Protection:
+        fresh = bool(self.satellites.fresh(now_ns))
+        return self._protector.protect(enu, covariance, now_ns, by_satellites=fresh)
 
     def _unplaced(self, now_ns: int, silent_s: float | None, alive: list[Foot]) -> Estimate:
         """Nothing is known but that the soldier is in the area: at the origin, give or take a lot."""
@@ -249,28 +292,27 @@ class Estimator:
             mode="unplaced",
             enu=(0.0, 0.0, 0.0),
             covariance=np.diag([sigma**2, sigma**2, sigma**2]),
-            speed_m_s=self._speed(alive) if moving else 0.0,
-            motion=self.boots.motion(now_ns) if moving else "unknown",
-            sources=self._sources(now_ns, alive if moving else []),
-            rejected=self.satellites.refused(now_ns),
+            speed_m_s=going.speed_m_s(alive) if moving else 0.0,
+            motion=going.motion_class(self.boots, now_ns) if moving else "unknown",
+            sources=self._carriers.sources(self.boots, now_ns, alive if moving else []),
+            rejected=(*self.boots.refused, *self.satellites.refused(now_ns)),
+            rejections=dict.fromkeys(self.boots.refused, "diverged") | self.satellites.why_refused(now_ns),
         )
 
     def _pose(
         self, now_ns: int, silent_s: float | None, alive: list[Foot]
     ) -> tuple[Vector3, Array, tuple[float, float] | None] | None:
         """Place, covariance (3, 3), and the turn (yaw, σ) of the filter's directions into ENU; None if unplaced."""
-        local = (
-            np.zeros(3) if not alive else sum((foot.at(now_ns) for foot in alive), np.zeros(3)) / len(alive)
-        )
+        local = self.boots.place_at(now_ns, alive)
         if self.placed:
-            return _xyz(local), self._covariance(alive), (0.0, 0.0)
+            return xyz(local), self._covariance(alive), (0.0, 0.0)
         move = self.placement.provisional if alive else None
         if move is not None:
-            jacobian = move.error_jacobian(_xyz(local))[:3]
+            jacobian = move.error_jacobian(xyz(local))[:3]
             spread = move.rotation() @ self._covariance(alive) @ move.rotation().T
             covariance = spread + jacobian @ move.covariance @ jacobian.T
-            return _xyz(move.point(_xyz(local))), covariance, (move.yaw_rad, math.sqrt(move.covariance[3, 3]))
-        return self._near_a_place(now_ns, silent_s, _xyz(local), alive)
+            return xyz(move.point(xyz(local))), covariance, (move.yaw_rad, math.sqrt(move.covariance[3, 3]))
+        return self._near_a_place(now_ns, silent_s, xyz(local), alive)
 
     def _near_a_place(
         self, now_ns: int, silent_s: float | None, local: Vector3, alive: list[Foot]
@@ -298,49 +340,3 @@ class Estimator:
         )
         spread: Array = jacobian @ self.boots.filter.covariance @ jacobian.T
         return spread + self._config.boots.pose_sigma_m**2 * np.eye(3)
-
-    def _speed(self, alive: list[Foot]) -> float:
-        strides = [foot.stride.speed_m_s for foot in alive if foot.stride is not None]
-        return sum(strides) / len(strides) if strides else 0.0
-
-    def _motion(
-        self, alive: list[Foot], turn: tuple[float, float] | None
-    ) -> tuple[Vector3, float, float | None]:
-        """Velocity, speed and σ of the course: mean of the feet's last strides; no direction without heading."""
-        if turn is None:
-            return (0.0, 0.0, 0.0), self._speed(alive), None
-        yaw, yaw_sigma = turn
-        velocities = np.array([self.boots.velocity(foot) for foot in alive])
-        east, north, up = _xyz(np.mean(velocities, axis=0))
-        cosine, sine = math.cos(yaw), math.sin(yaw)
-        velocity = (cosine * east - sine * north, sine * east + cosine * north, up)
-        return velocity, math.hypot(east, north), self._course_sigma(alive, yaw_sigma)
-
-    def _course_sigma(self, alive: list[Foot], yaw_sigma: float) -> float | None:
-        """Heading error and the last step's sideways error, the worst of the feet."""
-        sigmas = [
-            math.hypot(
-                math.sqrt(max(0.0, float(self.boots.filter.covariance[foot.block.yaw, foot.block.yaw]))),
-                foot.stride.lateral_sigma_m / foot.stride.length_m,
-            )
-            for foot in alive
-            if foot.stride is not None and foot.stride.length_m > 0.0
-        ]
-        return math.hypot(max(sigmas), yaw_sigma) if sigmas else None
-
-    def _sources(self, now_ns: int, alive: list[Foot]) -> tuple[str, ...]:
-        return (*sorted(foot.place for foot in alive), *self.satellites.fresh(now_ns))
-
-    def _mode(self, now_ns: int, silent_s: float | None, covariance: Array) -> Mode:
-        silence = self._config.silence
-        dead_s = (now_ns - self._begun_ns) / NS_PER_S if silent_s is None else silent_s
-        unaided_s = min(dead_s, self.satellites.silent_s(now_ns))
-        if unaided_s > silence.lost_s or horizontal_sigma_m(covariance) > silence.lost_sigma_m:
-            return "lost"
-        if self.satellites.fresh(now_ns):
-            return "gnss"
-        return "coasting" if dead_s > silence.coasting_s else "boots"
-
-
-def _xyz(values: Array) -> Vector3:
-    return float(values[0]), float(values[1]), float(values[2])

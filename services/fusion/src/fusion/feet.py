@@ -8,11 +8,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bootprint.clock import NS_PER_S
-from bootprint.messages import FootPose, FootStep, MotionClass, Vector3
+from bootprint.messages import FootPose, FootStep, MotionClass, Vector3, upper_triangle
 from fusion.joining import Joining
 from fusion.state import Array, FootBlock
 
+MOVING_M = 0.1  # a shorter step is standing
 _MOST_MISSING = 1000
+COARSE_STEP = np.diag([0.1, 0.1, 0.1, 0.05]) ** 2  # for a step that states no covariance
+_SAME_STANCE_NS = 300_000_000  # a pose so long before a step's start is of the same stance
+_POOR, _GOOD = 0.2, 0.5  # mean quality of recent strides
+_RECENT = 6  # strides by which a foot is judged
 _SAMPLES = 64  # of poses and steps: about five seconds
 _GAP_S = 1.0  # between one step's end and the next one's start: more is time nobody saw
 _LONGEST_GAP_S = 60.0  # after this nothing is known anyway
@@ -57,6 +62,10 @@ class StepLedger:
             return Entry()
         return None
 
+    def has(self, sequence: int) -> bool:
+        """Whether a step of this number has been entered."""
+        return self.last is not None and sequence <= self.last and sequence not in self.missing
+
     def _skip_to(self, sequence: int) -> Entry:
         """So many missing at once, and in all, are remembered and counted; more is a number that is wrong."""
         assert self.last is not None
@@ -74,6 +83,7 @@ class Stride:
     turn_rad: float
     duration_s: float
     lateral_sigma_m: float
+    quality: float = 1.0  # 0 to 1, as the foot INS says
 
     @property
     def length_m(self) -> float:
@@ -98,15 +108,36 @@ class Foot:
     end_ns: int | None = None
     heard_ns: int | None = None
     offset: Vector3 = (0.0, 0.0, 0.0)
+    pose: FootPose | None = None  # the newest since its last step
     stride: Stride | None = None
     motion: MotionClass = "unknown"
+    refused: bool = False  # it had to leave, and has not joined again
+    since_compass_m: float = 0.0  # walked since its magnetometer was looked at
+    strayed: bool = False  # its poses are out of the other foot's reach: it stands for nothing until it steps
     stepped: bool = False  # since the feet were last coupled
+    recent: deque[Stride] = field(default_factory=lambda: deque(maxlen=_RECENT))
     samples: deque[tuple[int, Array]] = field(default_factory=lambda: deque(maxlen=_SAMPLES))
 
     @property
     def place(self) -> str:
         """The name of the foot, e.g. ``left_foot``."""
         return self.block.place
+
+    @property
+    def carries(self) -> bool:
+        """Whether the body is over this foot, among others."""
+        return self.active and not self.strayed
+
+    @property
+    def quality(self) -> float | None:
+        """Mean of the recent strides', 0 to 1; None while there are too few to say."""
+        few = len(self.recent) < _RECENT
+        return None if few else sum(stride.quality for stride in self.recent) / len(self.recent)
+
+    def is_poor_beside(self, other: "Foot") -> bool:
+        """Whether this foot's strides are bad where the other's, on the same way, are good."""
+        own, others = self.quality, other.quality
+        return own is not None and others is not None and own < _POOR and others > _GOOD
 
     def is_heard(self, now_ns: int, within_s: float) -> bool:
         """Whether a message of this foot is not older than ``within_s``."""
@@ -127,19 +158,46 @@ class Foot:
             return min(broken_s, _LONGEST_GAP_S)
         return min(broken_s + max(gap_s, 0.5 * unseen), _LONGEST_GAP_S)
 
+    def uncarried_s(self, untracked_s: float, carried_ns: int | None) -> float:
+        """What of a time unobserved no other source has told."""
+        if carried_ns is None or self.end_ns is None:
+            return untracked_s
+        return max(0.0, untracked_s - max(0, carried_ns - self.end_ns) / NS_PER_S)
+
     def note_step(self, step: FootStep, lateral_sigma_m: float) -> None:
         """This step has been composed."""
         duration_s = max(0, step.time_ns - step.start_time_ns) / NS_PER_S
-        self.stride = Stride(step.displacement_m, step.heading_change_rad, duration_s, lateral_sigma_m)
-        self.offset = (0.0, 0.0, 0.0)
+        quality = 1.0 if step.quality_pct is None else step.quality_pct / 100.0
+        moved, turned = step.displacement_m, step.heading_change_rad
+        self.stride = Stride(moved, turned, duration_s, lateral_sigma_m, quality)
+        if self.stride.length_m > MOVING_M:
+            self.recent.append(self.stride)
+        self.offset, self.pose = (0.0, 0.0, 0.0), None
         self.motion = step.motion
+
+    def substitute(self, step: FootStep) -> FootStep | None:
+        """For a step lost just before this one: what the last pose before it told, if that was in its stance."""
+        pose = self.pose
+        if pose is None or self.end_ns is None or not pose.in_stance:
+            return None
+        if not 0 <= step.start_time_ns - pose.time_ns <= _SAME_STANCE_NS:
+            return None
+        return FootStep(
+            time_ns=step.start_time_ns,
+            sequence=step.sequence - 1,
+            start_time_ns=self.end_ns,
+            displacement_m=pose.displacement_m,
+            heading_change_rad=pose.heading_change_rad,
+            covariance=upper_triangle(COARSE_STEP),
+            motion=self.motion,
+        )
 
     def note_pose(self, pose: FootPose) -> bool:
         """Take where the foot is since its last step; False if the pose belongs to another step."""
         self.hear(pose.time_ns)
         if self.ledger.last is None or pose.step_sequence != self.ledger.last:
             return False
-        self.offset = pose.displacement_m
+        self.offset, self.pose = pose.displacement_m, pose
         return True
 
     def hear(self, time_ns: int) -> None:

@@ -5,6 +5,7 @@ is nonlinear: composing steps, wrapping angles. numpy alone: a library's filter 
 fusion, for six lines.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,9 @@ from bootprint.geodesy import wrap_angle
 from bootprint.messages import FootStep, Vector3
 from fusion.chi_square import chi_square_quantile
 from fusion.models import foot_step
+from fusion.models.shared_errors import Shares
 from fusion.state import FOOT_SIZE, Array, FootBlock, Layout
+from fusion.tape import Change, ChangeKind, Tape
 from fusion.transform import RigidTransform
 
 
@@ -54,21 +57,67 @@ def invert_spd(matrix: Array) -> Array:
 class StateFilter:
     """State (n,) and covariance (n, n) of all feet, in the frame of `fusion.state`; read them, never write."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: Layout, prior: tuple[Array, Array] | None = None) -> None:
+        size = layout.size
         self.layout = layout
-        self.state: Array = np.zeros(layout.size)
-        self.covariance: Array = np.zeros((layout.size, layout.size))
+        self.tape: Tape | None = None  # for a smoother
+        self.state, self.covariance = prior or (np.zeros(size), np.zeros((size, size)))
 
-    def propagate(self, block: FootBlock, step: FootStep, noise: Array) -> None:
-        """Compose a step (its covariance (4, 4) in the step's axes) onto a foot."""
+    def extend(self, place: str) -> FootBlock:
+        """A block of zeros for one more that walks along; it joins, or begins the frame."""
+        self.layout = self.layout.with_beside(place)
+        self.state = np.concatenate([self.state, np.zeros(FOOT_SIZE)])
+        self.covariance = np.pad(self.covariance, (0, FOOT_SIZE))
+        return self.layout.beside[-1]
+
+    def propagate(
+        self, block: FootBlock, step: FootStep, noise: Array, shares: Shares | None = None, kept: float = 1.0
+    ) -> None:
+        """Compose a step onto a foot; ``noise`` (4, 4) in the step's axes is what is the step's own.
+
+        With ``shares`` the errors that the foot's steps share act on it, ``kept`` of them still from before.
+        """
         state, pose = self.state.copy(), self.state[block.all]
+        displacement, turn = step.displacement_m, step.heading_change_rad
         transition, process = np.eye(state.size), np.zeros_like(self.covariance)
-        transition[block.all, block.all] = foot_step.pose_jacobian(pose, step.displacement_m)
         spread = foot_step.step_jacobian(pose)
+        if shares is not None:
+            displacement, turn = shares.corrected(step, state[block.common])
+            transition[block.all, block.common] = spread @ shares.per_unit
+            transition[block.common, block.common] *= kept
+            process[block.common, block.common] = (1.0 - kept**2) * np.eye(3)
+            state[block.common] *= kept
+        transition[block.all, block.all] = foot_step.pose_jacobian(pose, displacement)
         process[block.all, block.all] = spread @ noise @ spread.T
-        state[block.all] = foot_step.compose(pose, step.displacement_m, step.heading_change_rad)
-        self.state = state
-        self.covariance = transition @ self.covariance @ transition.T + process
+        state[block.all] = foot_step.compose(pose, displacement, turn)
+        self._advance(state, transition, process)
+
+    def lead(self, block: FootBlock, step: FootStep, noise: Array, along: Sequence[FootBlock]) -> Array:
+        """Compose a step onto one who takes others ``along``: these move and err with it, by (4,)."""
+        pose, shared = self.state[block.all], np.zeros((self.layout.size, FOOT_SIZE))
+        for one in (block, *along):
+            shared[one.all] = np.eye(FOOT_SIZE)
+        moved = foot_step.compose(pose, step.displacement_m, step.heading_change_rad) - pose
+        transition, spread = np.eye(self.layout.size), foot_step.step_jacobian(pose)
+        bent = foot_step.pose_jacobian(pose, step.displacement_m) - np.eye(FOOT_SIZE)
+        transition[:, block.all] += shared @ bent
+        self._advance(self.state + shared @ moved, transition, shared @ spread @ noise @ spread.T @ shared.T)
+        self._settle()
+        return np.asarray(moved)
+
+    def displace(self, blocks: Sequence[FootBlock], by: Array) -> None:
+        """Put these elsewhere, by (4,), as sure as they were."""
+        state = self.state.copy()
+        for block in blocks:
+            state[block.all] += by
+        self._advance(state, np.eye(self.layout.size), np.zeros_like(self.covariance))
+        self._settle()
+
+    def _advance(self, state: Array, transition: Array, process: Array, kind: ChangeKind = "carry") -> None:
+        covariance = transition @ self.covariance @ transition.T + process
+        if self.tape is not None:
+            self.tape.changes.append(Change(self.state, self.covariance, transition, state, covariance, kind))
+        self.state, self.covariance = state, covariance
 
     def update(self, measurement: Measurement) -> Innovation:
         """Gate, then update; the innovation tells what happened."""
@@ -97,22 +146,43 @@ class StateFilter:
         return Innovation(measurement.source, measurement.residual, covariance, squared, accepted)
 
     def _settle(self) -> None:
-        for block in self.layout.blocks:
+        for block in self.layout.walkers:  # of a state that the correction has made anew
             self.state[block.yaw] = wrap_angle(float(self.state[block.yaw]))
         self.covariance = 0.5 * (self.covariance + self.covariance.T)
 
     def widen(self, block: FootBlock, position_m2: float, yaw_rad2: float) -> None:
         """Add variance to one foot: something unobserved happened to it alone."""
-        for index in range(block.start, block.start + 3):
-            self.covariance[index, index] += position_m2
-        self.covariance[block.yaw, block.yaw] += yaw_rad2
+        process = np.zeros_like(self.covariance)
+        process[block.position, block.position] = position_m2 * np.eye(3)
+        process[block.yaw, block.yaw] = yaw_rad2
+        self._advance(self.state, np.eye(self.layout.size), process)
 
     def widen_together(self, position_covariance: Array, yaw_rad2: float = 0.0) -> None:
         """Add covariance (3, 3), m², and a yaw variance to all feet alike: the whole body was misjudged."""
-        for one in self.layout.blocks:
-            for other in self.layout.blocks:
-                self.covariance[one.position, other.position] += position_covariance
-                self.covariance[one.yaw, other.yaw] += yaw_rad2
+        process = np.zeros_like(self.covariance)
+        for one in self.layout.walkers:
+            for other in self.layout.walkers:
+                process[one.position, other.position] = position_covariance
+                process[one.yaw, other.yaw] = yaw_rad2
+        self._advance(self.state, np.eye(self.layout.size), process)
+
+    def carry(self, by_m: Array, covariance: Array) -> None:
+        """Move all feet alike by (3,) m, give or take ``covariance`` (3, 3)."""
+        state, process = self.state.copy(), np.zeros_like(self.covariance)
+        for one in self.layout.walkers:
+            state[one.position] += by_m
+            for other in self.layout.walkers:
+                process[one.position, other.position] = covariance
+        self._advance(state, np.eye(self.layout.size), process)
+
+    def widen_turned(self, feet: Sequence[FootBlock], yaw_rad2: float) -> None:
+        """The body may have turned unseen, about the middle between its feet: they went round with it."""
+        middle = np.mean([self.state[block.position] for block in feet], axis=0)
+        response = np.zeros(self.layout.size)
+        for block in feet:
+            east, north, _ = self.state[block.position] - middle
+            response[block.all] = (-north, east, 0.0, 1.0)
+        self._advance(self.state, np.eye(self.layout.size), yaw_rad2 * np.outer(response, response))
 
     def join(self, block: FootBlock, beside: FootBlock, pose: Array, noise: Array, alike: bool) -> None:
         """Set a foot to ``pose`` (4,), found relative to the foot ``beside`` it, give or take ``noise`` (4, 4).
@@ -121,33 +191,26 @@ class StateFilter:
         ``alike``, the difference between them is as much the fault of the one as of the other: each gets half of
         it, with opposite shares, and it is their mean that keeps the covariance of the foot that was here first.
         """
-        covariance = self.covariance.copy()
-        covariance[block.all, :] = covariance[beside.all, :]
-        covariance[:, block.all] = covariance[:, beside.all]
-        shares = [(block, block, 1.0)]
+        transition, process = np.eye(self.layout.size), np.zeros_like(self.covariance)
+        transition[block.all] = transition[beside.all]
+        process[block.all, block.all] = noise
         if alike:
-            shares = [
-                (one, other, 0.25 if one is other else -0.25)
-                for one in (block, beside)
-                for other in (block, beside)
-            ]
-        own = self.covariance[beside.all, beside.all].copy()
-        for one, other, share in shares:
-            covariance[one.all, other.all] = own + share * noise
-        self.covariance = covariance
-        self.state[block.all] = pose
+            for one, other in ((block, block), (beside, beside), (block, beside), (beside, block)):
+                process[one.all, other.all] = (0.25 if one is other else -0.25) * noise
+        state = self.state.copy()
+        state[block.all] = pose
+        self._advance(state, transition, process)
 
     def transform(self, move: RigidTransform) -> None:
         """Carry the whole state into another frame; the move's own error becomes common to all feet."""
-        jacobian = np.zeros_like(self.covariance)
+        jacobian = np.eye(self.layout.size)
         common = np.zeros((self.layout.size, FOOT_SIZE))
         state = self.state.copy()
-        for block in self.layout.blocks:
+        for block in self.layout.walkers:
             jacobian[block.all, block.all] = move.pose_jacobian()
             state[block.all] = move.pose(self.state[block.all])
             common[block.all] = move.error_jacobian(self._position(block))
-        self.state = state
-        self.covariance = jacobian @ self.covariance @ jacobian.T + common @ move.covariance @ common.T
+        self._advance(state, jacobian, common @ move.covariance @ common.T, "frame")
 
     def _position(self, block: FootBlock) -> Vector3:
         east, north, up = (float(value) for value in self.state[block.position])

@@ -1,7 +1,7 @@
 """How a foot finds its place beside another: two tracks of one walk, laid over one another.
 
-A foot outside the filter walks in a frame of its own. The middle of each of its steps is abreast of the other
-foot's stance (`fusion.models.dual_foot`), so pairs of such points differ by the feet's distance and sway only.
+A foot outside the filter walks in a frame of its own. Each of its steps tells where in that frame the other foot
+stood that it passed (`fusion.models.dual_foot`), so pairs of such points differ by how people sway only.
 """
 
 import math
@@ -22,7 +22,7 @@ _MOST_PAIRS = 50
 
 @dataclass(slots=True)
 class Joining:
-    """A foot's own track (middles of its steps) and the stances of the foot beside it, point by point.
+    """Where a foot has the other one's stances in its own frame, and where they are, point by point.
 
     ``together``: both began with the same walk, so that neither foot knows more than the other.
     """
@@ -31,9 +31,9 @@ class Joining:
     own: list[Vector3] = field(default_factory=list)
     beside: list[Vector3] = field(default_factory=list)
 
-    def add(self, middle: Vector3, stance: Vector3) -> None:
-        """One more pair of points abreast of each other."""
-        self.own.append(middle)
+    def add(self, own: Vector3, stance: Vector3) -> None:
+        """One more stance of the foot beside, as this foot has it and as it is."""
+        self.own.append(own)
         self.beside.append(stance)
 
     def relocate(self, transform: RigidTransform) -> None:
@@ -54,7 +54,7 @@ class Joining:
         if math.dist(self.own[0][:2], self.own[-1][:2]) < config.align.provisional_m or len(self.own) < 3:
             return None
         own, beside = np.array(self.own), np.array(self.beside)
-        sigma_m = math.sqrt(2.0) * config.align.lateral_sigma_m  # each foot's own sway
+        sigma_m = config.boots.join_fit_sigma_m
         fit = fit_rigid(own[:, :2], beside[:, :2], sigma_m**2 * np.eye(len(own)))
         unlike = fit.chi_square > chi_square_quantile(config.boots.gate_probability, 2 * len(own) - 3)
         if unlike or math.sqrt(fit.covariance[2, 2]) > sigma_m / config.align.distance_m:

@@ -1,17 +1,19 @@
 """What is published: `Position` messages out of a fused estimate, with reliability, floor and mode."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from bootprint.config import Origin
 from bootprint.geodesy import LocalFrame, azimuth_of, major_axis_sigma_m
 from bootprint.messages import Mode, MotionClass, Position, Vector3, upper_triangle
+from fusion.protection import Protection
 from fusion.state import Array
 
 _COURSE_SPEED_M_S = 0.3  # slower than this a course means nothing
 _HALF_RELIABLE_M = 5.0
+_LEAVES_FLOOR = 0.6  # storeys from the last floor, for another one
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +29,8 @@ class Estimate:
     motion: MotionClass = "unknown"
     sources: tuple[str, ...] = ()
     rejected: tuple[str, ...] = ()
+    rejections: dict[str, str] = field(default_factory=dict)
+    protection: Protection | None = None
 
 
 class Publisher:
@@ -35,7 +39,8 @@ class Publisher:
     def __init__(self, origin: Origin, floor_height_m: float | None) -> None:
         self._frame = LocalFrame(origin)
         self._floor_height_m = floor_height_m
-        self._sequence = 0
+        self.sequence = 0  # of the next message
+        self._floor: int | None = None
 
     def position(self, time_ns: int, estimate: Estimate) -> Position:
         """The message, numbered from zero."""
@@ -44,7 +49,7 @@ class Publisher:
         course, course_sigma = _course(estimate)
         message = Position(
             time_ns=time_ns,
-            sequence=self._sequence,
+            sequence=self.sequence,
             mode=estimate.mode,
             latitude_deg=latitude,
             longitude_deg=longitude,
@@ -57,20 +62,26 @@ class Publisher:
             speed_m_s=estimate.speed_m_s,
             course_rad=course,
             course_sigma_rad=course_sigma,
-            floor=self._floor(estimate),
+            floor=self._floor_of(estimate),
             motion=estimate.motion,
             sources=estimate.sources,
             rejected=estimate.rejected,
             reliability_pct=reliability_pct(estimate),
+            rejections=estimate.rejections,
+            protection_m=None if estimate.protection is None else estimate.protection.radius_m,
+            external_reliability_m=None if estimate.protection is None else estimate.protection.external_m,
         )
-        self._sequence += 1
+        self.sequence += 1
         return message
 
-    def _floor(self, estimate: Estimate) -> int | None:
-        """Floor by height above the origin (the ground floor's level), if floors are known."""
+    def _floor_of(self, estimate: Estimate) -> int | None:
+        """Floor by height above the origin (the ground floor's level), if known; sticks to the last one."""
         if self._floor_height_m is None or estimate.mode == "unplaced":
             return None
-        return round(estimate.enu[2] / self._floor_height_m)
+        storeys = estimate.enu[2] / self._floor_height_m
+        if self._floor is None or abs(storeys - self._floor) > _LEAVES_FLOOR:
+            self._floor = round(storeys)
+        return self._floor
 
 
 def horizontal_sigma_m(covariance: Array) -> float:

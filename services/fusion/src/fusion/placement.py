@@ -134,6 +134,16 @@ class Placement:
         return self._fit
 
     @property
+    def northward(self) -> RigidTransform | None:
+        """The move to the best known place of a frame whose yaw is true already; None before any is known."""
+        best = min(self.places, key=lambda place: place.sigma_m, default=None)
+        if best is None:
+            return None
+        up_sigma = UNKNOWN_UP_SIGMA_M if best.up_sigma_m is None else best.up_sigma_m
+        covariance = np.diag([best.sigma_m**2, best.sigma_m**2, up_sigma**2, 0.0])
+        return RigidTransform(best.local, best.enu, 0.0, covariance)
+
+    @property
     def provisional(self) -> RigidTransform | None:
         """The move into ENU as far as a heading hint and a first step tell it."""
         if self.hint is not None and self.hint.is_begun:

@@ -38,6 +38,7 @@ class Satellites:
     counters: Counter[str]
     accepted_ns: dict[str, int] = field(default_factory=dict)
     rejected_ns: dict[str, int] = field(default_factory=dict)
+    reasons: dict[str, str] = field(default_factory=dict)  # of the newest rejections
     normalised_squared: float = 0.0
     _stamps: deque[bool] = field(default_factory=lambda: deque(maxlen=_JUDGED))
 
@@ -103,8 +104,15 @@ class Satellites:
     def judge(self, position: SatellitePosition, innovation: Innovation) -> None:
         """Remember the gate's verdict on a fix."""
         self.normalised_squared = innovation.normalised_squared
+        self.reasons[position.source] = "innovation"
         (self.accepted_ns if innovation.accepted else self.rejected_ns)[position.source] = position.time_ns
         self.counters["gnss_accepted" if innovation.accepted else "gnss_rejected"] += 1
+
+    def distrust(self, position: SatellitePosition) -> None:
+        """The fix is of a receiver that is not believed."""
+        self.rejected_ns[position.source] = position.time_ns
+        self.reasons[position.source] = "spoofed"
+        self.counters["gnss_not_believed"] += 1
 
     def fresh(self, now_ns: int) -> tuple[str, ...]:
         """Receivers a fix of which was accepted lately."""
@@ -119,6 +127,10 @@ class Satellites:
                 if self._is_fresh(at, now_ns) and at > self.accepted_ns.get(source, at - 1)
             )
         )
+
+    def why_refused(self, now_ns: int) -> dict[str, str]:
+        """The same with the reasons."""
+        return {source: self.reasons[source] for source in self.refused(now_ns) if source in self.reasons}
 
     def silent_s(self, now_ns: int) -> float:
         """Seconds since any fix was accepted; infinite if none was."""

@@ -8,6 +8,8 @@ from bootprint.config import Origin
 from bootprint.figures import Figures
 from bootprint.messages import GnssFix, ImuBatch, Pressure
 from bootprint.topics import Identity
+from pdr_engine.body.azimuth.deviation import Deviation
+from pdr_engine.body.length.personal import Person
 from pdr_engine.boot import Boot
 from pdr_engine.config import PdrConfig
 from pdr_engine.rate import NS_PER_S
@@ -58,9 +60,14 @@ class EngineCore:
         return {**self._boots, **({} if self._trunk is None else {BODY: self._trunk})}
 
     @property
-    def personal_scale(self) -> tuple[float, float] | None:
-        """The person's factor on step length and its sigma, once satellites have told something; else None."""
-        return None if self._trunk is None else self._trunk.personal_scale
+    def person(self) -> Person | None:
+        """What is known of the person's step length, once satellites have told something; else None."""
+        return None if self._trunk is None else self._trunk.person
+
+    @property
+    def deviations(self) -> tuple[Deviation, ...]:
+        """Compass deviations by place, as far as they are mapped."""
+        return () if self._trunk is None else self._trunk.deviations
 
     def tick(self, now_ns: int) -> Iterable[Envelope]:
         """Note the time: silence shows in the figures."""

@@ -3,7 +3,6 @@
 A profile that cannot be read is told and left aside: the person is learned anew.
 """
 
-import os
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -14,8 +13,11 @@ import msgspec
 from bootprint.bus import Envelope
 from bootprint.config import Config
 from bootprint.figures import Figures
+from bootprint.files import write_whole
 from bootprint.service import CorePart
 from pdr_engine.body import BodySettings
+from pdr_engine.body.azimuth.deviation import Deviation
+from pdr_engine.body.length.personal import Person
 from pdr_engine.engine import EngineCore
 
 FILE = "body-profile.json"
@@ -24,10 +26,15 @@ _LEAST_SIGMA = 0.02  # shoes, load and place of the unit are not those of last t
 
 
 class BodyProfile(Config, frozen=True):
-    """The person's factor on step length and the sigma of its logarithm."""
+    """The person's factor on step length and the sigma of its logarithm; `LengthSettings.refinement`.
+
+    ``deviations``: of the compass by place, `BodySettings.deviations`.
+    """
 
     scale: Annotated[float, msgspec.Meta(ge=0.5, le=2.0)]
     scale_sigma: Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
+    refinement: tuple[Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)], ...] = ()
+    deviations: tuple[Deviation, ...] = ()
 
 
 def load_profile(path: Path) -> BodyProfile | None:
@@ -37,20 +44,16 @@ def load_profile(path: Path) -> BodyProfile | None:
 
 def save_profile(path: Path, profile: BodyProfile) -> None:
     """Write a profile so that a power cut leaves the old one or the new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    fresh = path.with_suffix(".new")
-    with fresh.open("wb") as file:
-        file.write(msgspec.json.encode(profile))
-        file.flush()
-        os.fsync(file.fileno())
-    fresh.replace(path)
+    write_whole(path, msgspec.json.encode(profile))
 
 
 def with_profile(settings: BodySettings, profile: BodyProfile) -> BodySettings:
     """Settings that begin with what is known of the person."""
     sigma = max(_LEAST_SIGMA, profile.scale_sigma)
-    length = msgspec.structs.replace(settings.length, scale=profile.scale, common_sigma_share=sigma)
-    return msgspec.structs.replace(settings, length=length)
+    length = msgspec.structs.replace(
+        settings.length, scale=profile.scale, common_sigma_share=sigma, refinement=profile.refinement
+    )
+    return msgspec.structs.replace(settings, length=length, deviations=profile.deviations)
 
 
 class EnginePart(CorePart):
@@ -80,10 +83,18 @@ class EnginePart(CorePart):
         return super().close()
 
     def _save(self) -> None:
-        found = self._engine.personal_scale
+        found = self._engine.person
         if found is None:
             return
         try:
-            save_profile(self._path, BodyProfile(scale=found[0], scale_sigma=found[1]))
+            save_profile(self._path, self._profile(found))
         except OSError:
             self._unsaved += 1  # a full disk costs the profile, not the soldier
+
+    def _profile(self, person: Person) -> BodyProfile:
+        return BodyProfile(
+            scale=person.scale,
+            scale_sigma=person.sigma,
+            refinement=person.refinement,
+            deviations=self._engine.deviations,
+        )

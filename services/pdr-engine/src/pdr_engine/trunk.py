@@ -10,6 +10,8 @@ from bootprint.geomagnetism import earth_field
 from bootprint.messages import BodyStep, GnssFix, ImuBatch, Pressure
 from bootprint.topics import Address
 from pdr_engine.body import BodyNavigator, BodySettings, BodyStepEstimate
+from pdr_engine.body.azimuth.deviation import Deviation
+from pdr_engine.body.length.personal import Person
 from pdr_engine.rate import RateMeter
 
 
@@ -41,11 +43,15 @@ class Trunk:
 
     def handle(self, batch: ImuBatch) -> Iterable[Envelope]:
         """Take a batch in; steps that it makes known come out."""
+        return self._publish(self.estimates(batch))
+
+    def estimates(self, batch: ImuBatch) -> list[BodyStepEstimate]:
+        """The same, with all that the navigator says of the steps."""
         times = batch.times
         self._rate.count(int(times[-1]), len(times))
         if self._declination_rad is None:
             self._learn_earth_field(int(times[0]))
-        return self._publish(self._navigator.process(times, batch.accel, batch.gyro, batch.mag))
+        return self._navigator.process(times, batch.accel, batch.gyro, batch.mag)
 
     def hear_pressure(self, pressure: Pressure) -> None:
         """The soldier's barometer, wherever it is worn."""
@@ -61,16 +67,22 @@ class Trunk:
         if declination is None:
             return
         if self._frame is None:
-            self._frame = LocalFrame(Origin(latitude_deg=fix.latitude_deg, longitude_deg=fix.longitude_deg))
+            here = Origin(latitude_deg=fix.latitude_deg, longitude_deg=fix.longitude_deg)
+            self._frame = LocalFrame(here if self._origin is None else self._origin)
         east, north, _ = self._frame.to_enu(fix.latitude_deg, fix.longitude_deg, 0.0)
         cosine, sine = math.cos(declination), math.sin(declination)
         east, north = cosine * east - sine * north, cosine * north + sine * east
         self._navigator.hear_fix(fix.time_ns, east, north, fix.horizontal_accuracy_m)
 
     @property
-    def personal_scale(self) -> tuple[float, float] | None:
-        """The person's factor on step length and its sigma; None before a fix has changed them."""
-        return self._navigator.personal_scale if self._navigator.knows_person else None
+    def person(self) -> Person | None:
+        """What is known of the person's step length; None before a fix has told any of it."""
+        return self._navigator.person if self._navigator.knows_person else None
+
+    @property
+    def deviations(self) -> tuple[Deviation, ...]:
+        """Compass deviations by place (METHODS B5); none without an origin: then every walk has its own frame."""
+        return () if self._origin is None else self._navigator.deviations
 
     def counters(self) -> dict[str, int]:
         """Counts since the start."""

@@ -1,4 +1,4 @@
-"""What this room adds to the `bootprint` command: `bootprint keys` and `bootprint radio profiles`."""
+"""What this room adds to the `bootprint` command: `bootprint keys`, `radio profiles`, `history`, `page`."""
 
 import time
 from datetime import datetime
@@ -9,6 +9,8 @@ import typer
 
 from bootprint.cli import group
 from bootprint.commands.options import Json, write_json
+from sa_hub.history import commands as history_commands
+from sa_hub.page import commands as page_commands
 
 KeyFile = Annotated[Path, typer.Argument(help="The group key's file, e.g. keys/group.key.")]
 RADIO_HELP = "Radios: what they cost a sender, and how formats do on them."
@@ -21,6 +23,8 @@ def register(app: typer.Typer) -> None:
     keys.command("roll")(roll)
     keys.command("finish")(finish)
     app.add_typer(keys, name="keys")
+    history_commands.register(app)
+    page_commands.register(app)
     group(app, "radio", RADIO_HELP).command("profiles")(profiles)
 
 

@@ -110,6 +110,12 @@ class HubCore:
             return []
         return [self._track(known)]
 
+    def place(self, fix: Fix, member: Member) -> list[Envelope]:
+        """A person says where another soldier is, who cannot be told: our picture takes it, until they report."""
+        report = report_of_fix(fix, member.number, self._conditions.get(member.number, "ok"))
+        known = self._tracks.update(report, max(self._now_ns, report.time_ns), "person")
+        return [] if known is None else [self._track(known)]
+
     def receive(self, link: str, datagram: bytes, now_ns: int) -> list[Envelope]:
         """A datagram from a link, arrived at ``now_ns`` of event time; anything may be in it."""
         self._advance(now_ns)

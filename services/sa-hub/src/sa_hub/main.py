@@ -1,5 +1,6 @@
 """The sa-hub process: links, key and counter files around the hub's core."""
 
+import heapq
 import math
 import time
 from collections import deque
@@ -10,10 +11,12 @@ from typing import Final
 
 from bootprint.bus import Envelope
 from bootprint.clock import EventClock
+from bootprint.config import Member
 from bootprint.figures import Figures
-from bootprint.messages import Track
+from bootprint.messages import Fix, Track
 from bootprint.service import Context, Service
 from sa_hub.assembly import build_hub
+from sa_hub.companions.together import companions_of
 from sa_hub.hub import STEP_NS, HubCore
 from sa_hub.keys import load_group_key, load_next_key
 from sa_hub.radio.counters import FileCounters
@@ -48,8 +51,9 @@ class LatencyGauge:
         """``latency_p99_ms``, if there is anything to tell."""
         if not self._seconds:
             return {}
-        ordered = sorted(self._seconds)
-        return {"latency_p99_ms": 1e3 * ordered[math.ceil(0.99 * len(ordered)) - 1]}
+        count = len(self._seconds)
+        longest = heapq.nlargest(count - math.ceil(0.99 * count) + 1, self._seconds)
+        return {"latency_p99_ms": 1e3 * longest[-1]}
 
 
 def _is_sensed(track: Track) -> bool:
@@ -71,6 +75,7 @@ class HubPart:
         self._frames_dropped = 0
         self._ticked_ns: int | None = None
         self._arrivals: deque[tuple[str, bytes]] = deque(maxlen=_MOST_WAITING)
+        self._companions = companions_of(context, settings, self._announce, self._place)
         self._links = self._open(settings.links)
 
     def _open(self, profiles: Iterable[LinkProfile]) -> dict[str, Link]:
@@ -81,9 +86,23 @@ class HubPart:
         return {each.name: open_link(each, partial(self._arrived, each.name), around) for each in profiles}
 
     def start(self) -> None:
-        """Begin to receive."""
+        """Begin to receive, and to tell the companions."""
+        self._companions.start(self._context)
         for link in self._links.values():
             link.start()
+
+    def _announce(self, envelope: Envelope) -> None:
+        """In a companion's thread: publish what it has heard."""
+        self._context.post(lambda: self._told([envelope]))
+
+    def _place(self, fix: Fix, member: Member) -> list[Envelope]:
+        """In the main loop: a person at the page says where somebody is."""
+        return self._told(self._core.place(fix, member))
+
+    def _told(self, envelopes: list[Envelope]) -> list[Envelope]:
+        """The companions are told what is published."""
+        self._companions.tell(envelopes)
+        return envelopes
 
     def _arrived(self, name: str, data: bytes) -> None:
         """Perhaps in the link's thread: the frame waits for the next look, and nobody is woken."""
@@ -113,7 +132,8 @@ class HubPart:
         """A message of our own soldier."""
         outputs = self._core.handle(envelope)
         self._latency.observe(outputs)
-        return outputs
+        self._companions.tell([envelope])
+        return self._told(outputs)
 
     def tick(self, now_ns: int) -> list[Envelope]:
         """Event time goes on; what the nets have to say goes out."""
@@ -123,7 +143,7 @@ class HubPart:
         outputs += self._core.tick(now_ns)
         for frame in self._core.take_frames():
             self._links[frame.link].send(frame.data)
-        return outputs
+        return self._told(outputs)
 
     def _made_up(self, now_ns: int) -> list[Envelope]:
         """After standing still, what would have been said meanwhile is not said now, all at once."""
@@ -144,12 +164,14 @@ class HubPart:
             "memory_faults": self._memory_faults,
             "frames_dropped": self._frames_dropped,
         }
+        beside = self._companions.figures()
         note = figures.note or "; ".join(link.fault for link in self._links.values() if link.fault)
+        note = note or beside.note
         return replace(
             figures,
             state="degraded" if note else figures.state,
-            counters=figures.counters | faults,
-            gauges=figures.gauges | self._latency.gauges(),
+            counters=figures.counters | faults | beside.counters,
+            gauges=figures.gauges | self._latency.gauges() | beside.gauges,
             note=note,
         )
 
@@ -158,6 +180,7 @@ class HubPart:
         for name, link in self._links.items():
             link.close()
             self._keep(name, self._memories[name].close)
+        self._companions.close()
         return ()
 
 

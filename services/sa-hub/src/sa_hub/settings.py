@@ -21,8 +21,12 @@ from bootprint.config import Config
 from bootprint.errors import ConfigError
 from bootprint.topics import check_part
 from sa_hub.awareness.settings import WarningSettings
+from sa_hub.history.settings import HistorySettings
+from sa_hub.outputs.settings import MavlinkOutSettings, NmeaSettings
+from sa_hub.page.settings import PageSettings
 from sa_hub.radio.link_profile import SMALLEST_MTU_BYTES
 from sa_hub.radio.link_profile import LinkProfile as LinkProfile
+from sa_hub.tak.settings import TakSettings
 
 Role = Literal["soldier", "squad_leader", "command_post"]
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
@@ -44,6 +48,11 @@ class HubSettings(Config, frozen=True):
     group_key: str | None = None
     exercise: bool = False
     warnings: WarningSettings = WarningSettings()
+    history: HistorySettings | None = None
+    tak: TakSettings | None = None
+    mavlink_out: MavlinkOutSettings | None = None
+    nmea: NmeaSettings | None = None
+    page: PageSettings | None = None
 
     @property
     def relays(self) -> bool:

@@ -20,6 +20,7 @@ from sensor_gateway.sources.replay import Replay
 
 if TYPE_CHECKING:
     from sensor_gateway.intake import Intake
+    from sensor_gateway.sources.camera import CameraIntake, StereoReader
 
 _JOIN_S = 2.0
 _IDLE_BEAT_S = 0.5  # of a gateway that only replays: its main loop has nothing to wait for
@@ -48,7 +49,7 @@ class LiveSource:
 
     name: str
     reader: Reader
-    intake: "Intake"
+    intake: "Intake | CameraIntake"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,7 @@ class Gateway:
         self._settings = settings
         self._live: list[LiveSource] = []
         self._replayed: list[ReplayedSource] = []
+        self._cameras: list[StereoReader] = []
         self._threads: list[threading.Thread] = []
         self._opened_ns = 0
         self._host = HostUtc()
@@ -91,6 +93,9 @@ class Gateway:
         if isinstance(source, config.ReplaySource):
             self._replayed.append(ReplayedSource(name, Replay(self._context, source)))
             return
+        if isinstance(source, config.CameraSource):
+            self._live.append(self._camera(source, name))
+            return
         from sensor_gateway.intake import (
             Intake,
         )  # brings the decoders' libraries, which a replay has no use for
@@ -98,12 +103,39 @@ class Gateway:
         intake = Intake(self._context.identity, source, self._host)
         self._live.append(LiveSource(name, self._reader(source, intake), intake))
 
+    def _camera(self, source: config.CameraSource, name: str) -> LiveSource:
+        from sensor_gateway.recordings.camera_folder import projections
+        from sensor_gateway.sources.camera import CameraIntake, StereoReader  # brings OpenCV
+        from sensor_gateway.stereo import StereoCalibration, StereoOdometry
+
+        context = self._context
+        path = context.computer.relative(source.calibration)
+        try:
+            odometry = StereoOdometry(StereoCalibration.of_projections(*projections(path)))
+        except ValueError as error:
+            raise ConfigError(f"{path}: {error}") from error
+        intake = CameraIntake(context.identity, source.name)
+        reader = StereoReader(source, odometry, context.clock, self._posted(intake.take), context.wait_stop)
+        self._cameras.append(reader)
+        return LiveSource(name, reader, intake)
+
+    def _heard(self, job: Callable[P, list[Envelope]]) -> Callable[P, list[Envelope]]:
+        """The same call, whose outcome the cameras hear too: a unit that sits beside one is of another source."""
+
+        def call(*args: P.args, **kwargs: P.kwargs) -> list[Envelope]:
+            envelopes = job(*args, **kwargs)
+            for camera in self._cameras:
+                camera.hear(envelopes)
+            return envelopes
+
+        return call
+
     def _reader(self, source: config.SerialSource | config.UdpSource, intake: "Intake") -> Reader:
         from sensor_gateway.sources.serial import SerialReader
         from sensor_gateway.sources.udp import UdpReader
 
         context = self._context
-        on_bytes = self._posted(intake.feed)
+        on_bytes = self._posted(self._heard(intake.feed))
         if isinstance(source, config.UdpSource):
             return UdpReader(source, context.clock, on_bytes, context.wait_stop)
         return SerialReader(source, context.clock, on_bytes, self._posted(intake.cut), context.wait_stop)

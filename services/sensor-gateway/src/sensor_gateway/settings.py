@@ -94,7 +94,30 @@ class ReplaySource(Device, frozen=True, kw_only=True, tag_field="kind", tag="rep
     exit_when_done: bool = False
 
 
-Source = SerialSource | UdpSource | ReplaySource
+class CameraSource(Config, frozen=True, kw_only=True, tag_field="kind", tag="camera"):
+    """A stereo camera: two devices (number, or what OpenCV opens: a path, an address) of rectified images.
+
+    ``calibration`` is a file with the projection matrices ``P0:`` and ``P1:``, as in a camera folder. ``imu`` is
+    the place of an inertial unit beside it, with axes forward, left, up, if one of the other sources has it.
+    """
+
+    left: int | str
+    right: int | str
+    calibration: str
+    name: Place = "camera"
+    rate_hz: Annotated[float, msgspec.Meta(ge=1.0, le=60.0)] = 10.0
+    imu: Place | None = None
+
+    def expected(self) -> tuple[tuple[str, str], ...]:
+        """The (subject, source) pair it should feed."""
+        return (("camera_motion", self.name),)
+
+    def mapped(self) -> Iterable[tuple[str, Sensor]]:
+        """It has no mapping table."""
+        return ()
+
+
+Source = SerialSource | UdpSource | ReplaySource | CameraSource
 
 
 class GatewaySettings(Config, frozen=True):

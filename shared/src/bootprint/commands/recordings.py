@@ -46,7 +46,7 @@ def record(
     """Record the bus into an MCAP file until Ctrl-C.
 
     Every second what has been heard is on the disk, and a recording that was cut off is still readable.
-    Positions also appear on Foxglove's map.
+    Positions, tracks and observations also appear on Foxglove's map.
 
     Example: bootprint record walk.mcap --duration 60
     """

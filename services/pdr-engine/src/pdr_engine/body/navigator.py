@@ -13,9 +13,10 @@ from bootprint.messages import Direction, Float64Array, Int64Array
 from pdr_engine.body.altitude.heights import Height, Heights
 from pdr_engine.body.azimuth.ahead import Ahead
 from pdr_engine.body.azimuth.bearings import Bearing, Bearings
+from pdr_engine.body.azimuth.deviation import Deviation
 from pdr_engine.body.azimuth.misalignment import Misalignment
 from pdr_engine.body.estimate import BodyStepEstimate
-from pdr_engine.body.length.personal import PRIOR_SIGMA, PersonalScale
+from pdr_engine.body.length.personal import PRIOR_SIGMA, Person, PersonalScale
 from pdr_engine.body.length.step_length import StepLengths, projected
 from pdr_engine.body.movement.classes import Movement
 from pdr_engine.body.movement.feet import Feet
@@ -27,6 +28,7 @@ from pdr_engine.body.steps.footfalls import Footfalls
 from pdr_engine.body.steps.grid import CELL_S, Cell, Grid
 from pdr_engine.body.steps.intake import Intake, Sample, Vector
 from pdr_engine.body.steps.strides import WIDTH, Cut, Strides
+from pdr_engine.body.track.cross_check import CrossCheck
 from pdr_engine.body.track.reliability import Reliance
 from pdr_engine.body.track.retrace import Retrace
 
@@ -52,13 +54,16 @@ class BodyNavigator:
         self._footfalls = Footfalls(self.settings.steps)
         self._strides = Strides(self.settings.heading.denoising)
         self._bearings = Bearings(self.settings)
-        self._heights = Heights()
-        self._posture, self._feet = Posture(fixed=length.placement == "trunk"), Feet()
+        self._heights = Heights(self.settings.altitude)
+        self._posture, self._feet = Posture(), Feet()
         self._lengths = StepLengths(self.settings.step_length, length)
-        self._personal = PersonalScale(length.scale, length.common_sigma_share)
+        self._personal = PersonalScale(
+            length.scale, length.common_sigma_share, self._lengths.refined(length.refinement)
+        )
         self._misalignment = Misalignment()
         self._retrace = Retrace() if self.settings.retrace else None
         self._reliance = Reliance(calibrated=length.common_sigma_share < PRIOR_SIGMA)
+        self._cross_check = CrossCheck()
         self._pressure_pa: float | None = None
         self._gravity_m_s2 = STANDARD_GRAVITY_M_S2
         self._yaw_rad = 0.0
@@ -99,6 +104,8 @@ class BodyNavigator:
         self._personal.fix(time_ns, east_m, north_m, accuracy_m)
         self._misalignment.fix(time_ns, east_m, north_m, accuracy_m)
         self._reliance.fix(time_ns, accuracy_m)
+        if self._bearings.repeated is not None:
+            self._bearings.repeated.fix(east_m, north_m, accuracy_m)
         if self._personal.stretches > stretches:
             self._reliance.calibrated()
 
@@ -107,9 +114,14 @@ class BodyNavigator:
         self._heights.reference(time_ns, height_m, sigma_m)
 
     @property
-    def personal_scale(self) -> tuple[float, float]:
-        """The person's factor on step length and its sigma, to be begun with the next time."""
-        return self._personal.factor, self._personal.sigma
+    def person(self) -> Person:
+        """What is known of the person's step length, to be begun with the next time."""
+        return self._personal.person
+
+    @property
+    def deviations(self) -> tuple[Deviation, ...]:
+        """What is known of the compass by place, to be begun with the next time."""
+        return () if self._bearings.repeated is None else tuple(self._bearings.repeated.cells())
 
     @property
     def knows_person(self) -> bool:
@@ -119,7 +131,8 @@ class BodyNavigator:
     def counters(self) -> dict[str, int]:
         """Counts since the start."""
         refused = self._footfalls.refused + self._still_steps
-        return {**self._intake.counters, "false_steps": refused, "body_steps": self._steps}
+        rejected = {f"{name}_azimuths_rejected": count for name, count in self._cross_check.rejected.items()}
+        return {**self._intake.counters, "false_steps": refused, "body_steps": self._steps, **rejected}
 
     @property
     def gyro_bias_rad_s(self) -> Vector:
@@ -138,6 +151,7 @@ class BodyNavigator:
         found: list[BodyStepEstimate] = []
         for cell in self._grid.add(sample.time_ns, self._level(sample, rows)):
             self._strides.add(cell)
+            self._heights.accelerate(cell.time_ns, cell.values[2])
             vertical = self._free_of_gravity(cell)
             for start_ns, end_ns in self._footfalls.take(cell.time_ns, vertical):
                 found.extend(self._step(start_ns, end_ns))
@@ -172,7 +186,7 @@ class BodyNavigator:
         stride = cut.stride(self._ahead.angle_rad, self._gravity_m_s2, self._pressure_pa)
         height = self._heights.step(end_ns)
         movement = self._judge(cut, stride, height)
-        bearing = self._bearings.step(cut)
+        bearing = self._bearings.step(cut, self._attitude.rest_turn_rad_s)
         if movement.name == "standing":
             self._still_steps += 1
             return []
@@ -184,7 +198,7 @@ class BodyNavigator:
             stride,
             cut.yaw_rad,
             None if height is None else height.climb,
-            self._posture.tilt_rad(rows),
+            self._posture.tilt_rad(rows, self._lengths.on_trunk),
             self.settings.classes and self._ahead.known,
         )
         runs = movement.name == "running"
@@ -202,8 +216,9 @@ class BodyNavigator:
         if not bearing.disturbed:
             self._reliance.bias_updated(cut.end_ns)
         satellites = self._misalignment.satellite_azimuth(cut.end_ns)
+        disturbed = bearing.disturbed or "compass" in self._rejected(cut.end_ns, bearing, satellites)
         reliability = self._reliance.step(
-            cut.end_ns, length, bearing.disturbed, satellites is not None, self._heights.reference_ns
+            cut.end_ns, length, disturbed, satellites is not None, self._heights.reference_ns
         )
         reading = bearing.reading
         return BodyStepEstimate(
@@ -225,10 +240,20 @@ class BodyNavigator:
             azimuth_walk_rad=settings.heading.gyro_noise_rad_sqrt_s * math.sqrt(cut.gait.interval_s),
             height=height,
             reliability=reliability,
-            disturbed=bearing.disturbed,
+            disturbed=disturbed,
             gait=cut.gait,
             turn_rate_rad_s=cut.turn_rate_rad_s,
             stride=stride,
+        )
+
+    def _rejected(self, time_ns: int, bearing: Bearing, satellites_rad: float | None) -> tuple[str, ...]:
+        """The azimuths that the others contradict."""
+        ahead_rad, reading = self._ahead.angle_rad - self._misalignment.angle_rad, bearing.reading
+        sigma = self._misalignment.sigma_at(time_ns, self.settings.heading.gyro_drift_rad_s)
+        return self._cross_check.step(
+            None if reading is None else (reading.azimuth_rad - ahead_rad, reading.sigma_rad),
+            (bearing.gyro.azimuth_rad - ahead_rad, bearing.gyro.sigma_rad),
+            None if satellites_rad is None else (satellites_rad, sigma),
         )
 
     def _heading_sigma(self, time_ns: int, bearing: Bearing) -> float:
@@ -247,7 +272,8 @@ class BodyNavigator:
             turn, motion = cut.turn_rate_rad_s, movement.motion
             level = self._lengths.length(cut.gait, turn, motion, direction)
             slope = 0.0 if height is None else height.slope_rad(level / cut.gait.interval_s)
-            return self._personal.factor * projected(level, slope)
+            self._personal.meet(self._lengths.features(cut.gait, slope))
+            return self._personal.factor * projected(self._lengths.on_slope(level, cut.gait, slope), slope)
 
         told_rad = bearing.heading.azimuth_rad - self._ahead.angle_rad
         length, azimuth = self._feet.go(movement, told_rad, length_m)
@@ -255,4 +281,9 @@ class BodyNavigator:
         self._personal.walk(length, azimuth)
         self._misalignment.walk(length, azimuth)
         azimuth += self._misalignment.angle_rad
-        return (length, azimuth) if self._retrace is None else self._retrace.published(length, azimuth)
+        if self._retrace is not None:
+            learned = self._personal.factor * self._lengths.learned
+            length, azimuth = self._retrace.published(length, azimuth, learned)
+        if self._bearings.repeated is not None:
+            self._bearings.repeated.walk(length, azimuth)
+        return length, azimuth

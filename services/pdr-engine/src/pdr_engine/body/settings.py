@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from bootprint.config import Config
+from pdr_engine.body.azimuth.deviation import Deviation
 
 StepLength = Literal["blend", "pendulum", "frequency", "weinberg", "network"]
 Azimuth = Literal[
@@ -45,17 +46,28 @@ class StepSettings(Config, frozen=True):
     smallest_rise_m_s2: Positive = 0.8  # from trough to peak of the smoothed vertical acceleration
     share_of_usual_rise: Positive = 0.3  # a step rises at least by this part of the usual step's
     shortest_s: Positive = 0.22  # sprinters make 4.5 steps a second
+    # Nobody walks much faster than three steps a second; who flies bounces by 1 g, some of it smoothed away.
+    shortest_walk_s: Positive = 0.29
+    run_rise_m_s2: Positive = 9.0
     longest_s: Positive = 1.5
-    share_of_usual_interval: Positive = 0.55
+    share_of_usual_interval: Positive = (
+        0.55  # sooner comes only a peak that rises nearly as the usual one does:
+    )
+    share_of_usual_rise_soon: Positive = 0.6
     # A bout begins with this many steps whose intervals differ by less than this share of the shortest.
     steps_to_begin: Annotated[int, msgspec.Meta(ge=2, le=10)] = 3
     irregularity: Positive = 0.45
+    # After what was no walk with so many, until so many were walked.
+    steps_in_doubt: Annotated[int, msgspec.Meta(ge=4, le=16)] = 10
+    steps_until_trusted: Annotated[int, msgspec.Meta(ge=1, le=1000)] = 60
 
 
 class LengthSettings(Config, frozen=True):
     """Step length models. Factors and coefficients: `proving_ground.evaluation.train_body`, unless said."""
 
     scale: Positive = 1.0  # the person's own factor on whatever model is used, to begin with
+    # C2: what is added to the network's output weights for this person, as fixes of earlier walks told.
+    refinement: tuple[float, ...] = ()
     leg_length_m: Positive = 0.9
     # Zijlstra and Hof 2003: length = factor · 2 √(2 l h − h²) with h the rise of the trunk in a step.
     # The factor is theirs for the trunk; a hand bounces harder, so there it is smaller. Which of both it is, is
@@ -93,6 +105,7 @@ class HeadingSettings(Config, frozen=True):
     # A field that is off by a part of its strength errs by about that angle; indoors alike over some metres.
     disturbance_floor: Positive = 0.14
     correlation_steps: Positive = 240.0
+    sway_steps: Positive = 10.0  # for which tilt errors and sway are alike
     first_sigma_rad: Positive = 0.7  # of a bridge's first azimuth: nobody knows yet what the field is like
     gyro_noise_rad_sqrt_s: NonNegative = 0.005
     gyro_drift_rad_s: NonNegative = 0.003  # one sigma of the bias that is left: 10°/min
@@ -109,6 +122,14 @@ class CompassCalibration(Config, frozen=True):
     matrix: tuple[Row3, Row3, Row3] = IDENTITY
 
 
+class AltitudeSettings(Config, frozen=True):
+    """What is known of the building: floors are counted by it until some were visited."""
+
+    storey_m: Positive = 3.6
+    storey_sigma_m: Positive = 0.9
+    start_floor: int = 0
+
+
 class BodySettings(Config, frozen=True):
     """All settings of the body-worn unit's navigator."""
 
@@ -122,4 +143,8 @@ class BodySettings(Config, frozen=True):
     steps: StepSettings = StepSettings()
     length: LengthSettings = LengthSettings()
     heading: HeadingSettings = HeadingSettings()
+    altitude: AltitudeSettings = AltitudeSettings()
     calibration: CompassCalibration = CompassCalibration()
+    # B5: compass deviations by place are taken off where earlier walks saw them, and learned for the next.
+    deviation_map: bool = False
+    deviations: tuple[Deviation, ...] = ()  # in metres east, north of the realm's origin, magnetic north

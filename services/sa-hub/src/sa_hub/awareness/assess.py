@@ -18,6 +18,9 @@ from sa_hub.tracks import Known
 
 _BEYOND_SIGMAS: Final = 4.0
 """A friendly farther beyond all that is dangerous than this is in no danger."""
+_CLOSING_M_S: Final = 10.0
+"""Two who run towards each other; doubt grows more slowly."""
+_LONGEST_CLEAR_S: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +79,12 @@ def danger_of(
     }
     _, likeliest = max(found, key=lambda pair: max(pair[0].values(), default=0.0))
     return Danger(friendly, likeliest, probabilities, known.state, age_s, report.floor)
+
+
+def clear_for_s(place: Place, reach_m: float) -> float:
+    """For how long somebody this far from all danger cannot get into it, at most so long as a jump may matter."""
+    beyond_m = place.distance_m - reach_m - _BEYOND_SIGMAS * place.sigma_m
+    return min(beyond_m / _CLOSING_M_S, _LONGEST_CLEAR_S)
 
 
 def _moved(report: Report, us: Standpoint, age_s: float, held: Held | None) -> Place:

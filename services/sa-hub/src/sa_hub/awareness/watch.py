@@ -10,7 +10,7 @@ from bootprint.awareness import Contacts, FriendlyWarning, Reason
 from bootprint.clock import NS_PER_S
 from bootprint.config import Member
 from bootprint.display import Held
-from sa_hub.awareness.assess import Standpoint, Surroundings, danger_of, standpoint_of
+from sa_hub.awareness.assess import Standpoint, Surroundings, clear_for_s, danger_of, standpoint_of
 from sa_hub.awareness.contacts import ContactMap
 from sa_hub.awareness.danger import Corridor
 from sa_hub.awareness.lines import Lines
@@ -36,6 +36,8 @@ class Watch:
         self._settings = settings
         self._warner = FriendlyWarner(member.id, settings)
         self._nets: dict[str, NetQuality] = {}
+        self._clear: dict[int, tuple[Known, int]] = {}
+        self._reach_m = 0.0
 
     def held(self, link: str) -> Held | None:
         """How well a net keeps the picture right, None until enough was heard."""
@@ -52,6 +54,7 @@ class Watch:
 
     def set_back(self, by_ns: int) -> None:
         """The hub's clock was set back by so much."""
+        self._clear.clear()
         for part in (self.contacts, self.lines, self._warner):
             part.set_back(by_ns)
 
@@ -70,14 +73,26 @@ class Watch:
             return
         us = standpoint_of(own, now_ns)
         around = self._surroundings(us, now_ns)
+        reach_m = around.reach_m
+        if reach_m > self._reach_m:
+            self._clear.clear()
+        self._reach_m = reach_m
         for known in tracks.all():
             report = known.report
-            if report.number == self._own or report.mode == "unplaced":
+            if report.number == self._own or report.mode == "unplaced" or self._is_clear(known, now_ns):
                 continue
             friendly = self._roster[report.number].id
             danger = danger_of(friendly, known, us, around, self.held(known.via), now_ns)
             if danger.probabilities or self._warner.watches(friendly):
                 yield danger
+            elif known.state == "fresh":
+                until_ns = now_ns + round(clear_for_s(danger.place, reach_m) * NS_PER_S)
+                self._clear[report.number] = known, until_ns
+
+    def _is_clear(self, known: Known, now_ns: int) -> bool:
+        """Whether this one was too far away to be in danger yet, and has told nothing new since."""
+        seen, until_ns = self._clear.get(known.report.number, (None, 0))
+        return seen is known and now_ns < until_ns
 
     def _surroundings(self, us: Standpoint, now_ns: int) -> Surroundings:
         targets = self.lines.targets((us.latitude_deg, us.longitude_deg), us.sigma_m, now_ns)

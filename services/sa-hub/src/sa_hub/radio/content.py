@@ -5,6 +5,7 @@ from typing import Final, Literal, TypeVar, get_args
 
 from bootprint.messages import Mode, ObservationCode
 from sa_hub.radio.control import Acknowledgement, Fragment, Request
+from sa_hub.radio.layout import FAR_BITS, NEAR_BITS
 
 AlertKind = Literal["contact", "casualty", "help", "fire", "withdraw", "other"]
 Condition = Literal["ok", "busy", "wounded", "out"]
@@ -82,6 +83,8 @@ class Entry:
     age_ticks: int = 0
     quality: Quality | None = None
     level: Level | None = None
+    far: bool = False
+    steady: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +92,8 @@ class Update:
     """Soldiers told against what receivers predict: rows and columns of ``resolution`` modulo 2^``reach_bits``.
 
     Whoever missed no more than ``misses`` of the sender's frames since it last heard of a soldier can resolve that
-    entry. ``tick`` is the frame's time, modulo 256 when it is read from a frame.
+    entry. ``tick`` is the frame's time, modulo 256 when it is read from a frame. ``varied``: entries that are
+    ``far`` have more low bits and others fewer, and those that are ``steady`` tell no velocity.
     """
 
     tick: int
@@ -98,6 +102,11 @@ class Update:
     misses: int
     entries: tuple[Entry, ...]
     feedback: Feedback | None = None
+    varied: bool = False
+
+    def reach_of(self, entry: Entry) -> int:
+        """How many low bits of row and column the entry tells."""
+        return self.reach_bits + self.varied * (FAR_BITS if entry.far else NEAR_BITS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,9 @@
 """What to tell a sender of its frames that we heard: only where it helps, on reports that we send anyway.
 
-Feedback costs bits, so it goes to who speaks in updates, and only while some of their last frames were missed, or
-now and then after many, so that they learn how little is lost here. Each goes back to the feedback before the last
-one, so one may be lost.
+Feedback costs bits, so it goes to who speaks in updates of at least half as many soldiers as we do (a leader's own
+bits are worth more than what one soldier could save by them), and only at first, while some of their last frames
+were missed, or now and then after many, so that they learn how little is lost here. The first goes back as far as
+it can, each other one to the feedback before the last one, so one may be lost.
 """
 
 from collections.abc import Callable, Iterable
@@ -18,7 +19,7 @@ _ENOUGH: Final = 24
 
 @dataclass(slots=True)
 class _Told:
-    """Of a sender: its epoch, the counters told up to last and before, its first update, whom it tells of."""
+    """Of a sender: its epoch, the counters told up to last and before, the first of use, whom it tells of."""
 
     epoch: int
     last: int
@@ -33,16 +34,25 @@ class Hearing:
     def __init__(self) -> None:
         self._told: dict[int, _Told] = {}
 
-    def heard_update(self, sender: int, epoch: int, counter: int, soldiers: Iterable[int]) -> None:
-        """This one speaks in updates, of these: feedback is of use to it."""
+    def heard_telling(self, sender: int, epoch: int, counter: int, soldiers: Iterable[int]) -> None:
+        """This one tells of these in updates, or of others than itself: feedback is of use to it."""
         told = self._told.get(sender)
         if told is None or told.epoch != epoch:
-            told = self._told[sender] = _Told(epoch, counter - 1, counter - 1, counter)
+            told = self._told[sender] = _Told(
+                epoch, last=counter - 1, before=counter - 1 - LONGEST_SPAN, first=counter
+            )
         told.soldiers.update(soldiers)
 
-    def due(self, heard: Callable[[int], Heard | None]) -> Feedback | None:
-        """Feedback to the one who needs it most, if anyone does; ``heard`` gives what came of a sender."""
-        needs = {sender: self._need(told, heard(sender)) for sender, told in self._told.items()}
+    def due(self, heard: Callable[[int], Heard | None], telling_of: int) -> Feedback | None:
+        """Feedback to the one who needs it most, if anyone does.
+
+        ``heard`` gives what came of a sender; we tell of so many soldiers ourselves.
+        """
+        needs = {
+            sender: self._need(told, heard(sender))
+            for sender, told in self._told.items()
+            if 2 * len(told.soldiers) >= telling_of
+        }
         sender = max(needs, key=lambda each: needs[each], default=None)
         newest = None if sender is None else heard(sender)
         if sender is None or newest is None or needs[sender] == 0:
@@ -61,7 +71,8 @@ class Hearing:
         new = heard.highest - told.last
         seen = min(heard.highest - told.first + 1, LONGEST_SPAN)
         lossy = bool(~heard.mask & ((1 << seen) - 1))
-        return new * len(told.soldiers) if new >= _ENOUGH or (new > 0 and lossy) else 0
+        first = told.last < told.first
+        return new * len(told.soldiers) if new >= _ENOUGH or (new > 0 and (lossy or first)) else 0
 
 
 def _feedback(sender: int, told: _Told, heard: Heard) -> Feedback:

@@ -175,7 +175,13 @@ UPDATE: Final = (
     Field("paced", 1, "0: speeds of people on foot; 1: all speeds", _PLAIN),
     Field("detailed", 1, "1: some soldier's quality or level has changed", _PLAIN),
     Field("aged", 1, "1: some soldier's report is older than 2 s", _PLAIN),
-    Field("still", 1, "1: all of them stand"),
+    Field(
+        "varied",
+        1,
+        "1: each soldier tells whether it needs more bits, and whether it goes on as before",
+        _TOLD,
+    ),
+    Field("still", 1, "1: all that are not steady stand"),
     Field("own", 1, "1: the sender tells of itself only"),
     Field("near", 1, "1: the first number is near the sender's", (("own", 0),)),
     Field("beside", 4, "the first number less the sender's, plus 8", _NEAR_NUMBER),
@@ -185,11 +191,23 @@ UPDATE: Final = (
     Field("gap_code", 2, "g: the parameter of the gaps' Rice code is k = 2 g, else 0", _SPREAD),
 )
 _MOVES, _QUALITY, _LEVEL = ("moving", 1), ("quality", 1), ("level", 1)
+_VARIED = (("varied", 1),)
+_SAME_REACH, _CLOSE, _FAR_OFF = (("varied", 0),), (*_VARIED, ("far", 0)), (*_VARIED, ("far", 1))
+_COLUMN, _ROW = "column of cells, low bits", "row of cells, low bits"
+NEAR_BITS, FAR_BITS = -1, 2
+"""What an entry's reach is more than its frame's, in a frame in which it varies."""
+NEAR_REACH, FAR_REACH = f"reach - {-NEAR_BITS}", f"reach + {FAR_BITS}"
 ENTRY: Final = (
-    Field("east", "reach", "column of cells, low bits"),
-    Field("north", "reach", "row of cells, low bits"),
+    Field("far", 1, "1: more low bits of its place follow", _VARIED),
+    Field("steady", 1, "1: velocity as told before", _VARIED),
+    Field("east", "reach", _COLUMN, _SAME_REACH),
+    Field("north", "reach", _ROW, _SAME_REACH),
+    Field("east", NEAR_REACH, _COLUMN, _CLOSE),
+    Field("north", NEAR_REACH, _ROW, _CLOSE),
+    Field("east", FAR_REACH, _COLUMN, _FAR_OFF),
+    Field("north", FAR_REACH, _ROW, _FAR_OFF),
     Field("age", 8, "of the report at the frame's time, as in a squad report", (("aged", 1),)),
-    Field("moving", 1, "0: standing", (("still", 0),)),
+    Field("moving", 1, "0: standing", (("still", 0), ("steady", 0))),
     Field("direction", 4, "of motion, 1/16 turn clockwise from true north", (_MOVES,)),
     Field("pace", 2, "0.49, 0.81, 1.32, 2.16 m/s", (_MOVES, ("paced", 0))),
     Field("speed", 4, "0.3 m/s · 1.28^code", (_MOVES, ("paced", 1))),

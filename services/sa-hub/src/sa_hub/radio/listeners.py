@@ -7,7 +7,7 @@ place of stand-ins: of its picture only the last few frames are left to chance.
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -23,19 +23,28 @@ LOSSLESS: Final = 0.005
 _SILENT_NS: Final = 300 * NS_PER_S
 _REMEMBERED: Final = 64
 _LEARNING: Final = 0.02
+_NONE_OPEN: Final = 1 << 40
 
 
 @dataclass(slots=True)
 class _Listener:
-    """One hub that gives feedback: the row of its certain picture, and the last frame that this takes in."""
+    """One hub that gives feedback: the row of its certain picture, and the last frame that this takes in.
+
+    ``proven``: the time of the newest report by slot that it has said to have heard in a frame of ours.
+    """
 
     row: int
     counter: int
     told_ns: int
+    proven: dict[int, float] = field(default_factory=dict)
 
 
 class Listeners:
-    """The receivers of one net. ``loss``: the share of frames that they miss, as assumed or as told."""
+    """The receivers of one net. ``loss``: the share of frames that they miss, as assumed or as told.
+
+    ``pictures``: what they may have; a share of rows for each that tells, then one for all that were heard here but
+    do not tell, or all rows while nobody does.
+    """
 
     def __init__(self, loss: float, seed: int) -> None:
         self.loss = loss
@@ -43,47 +52,72 @@ class Listeners:
         self._slots = 0
         self._sent: deque[tuple[int, Spoken]] = deque(maxlen=_REMEMBERED)
         self._listeners: dict[int, _Listener] = {}
+        self._heard_ns: dict[int, int] = {}
         self._certain = Pictures(0)
-        self.pictures = Pictures(1 if loss < LOSSLESS else ROWS)
+        self._strangers = 0
+        self._stand_ins = Pictures(1 if loss < LOSSLESS else ROWS)
+        self.pictures = self._stand_ins
 
     @property
     def tell(self) -> bool:
         """Whether any receiver tells what it heard."""
         return bool(self._listeners)
 
+    @property
+    def all_tell(self) -> bool:
+        """Whether every receiver does that was heard of late, and there is one."""
+        return self.tell and self._heard_ns.keys() <= self._listeners.keys()
+
     def widen(self, slots: int) -> None:
         """Make room for so many soldiers."""
         self._slots = slots
-        self._certain.widen(slots)
-        self.pictures.widen(slots)
+        for pictures in (self._certain, self._stand_ins, self.pictures):
+            pictures.widen(slots)
 
     def certain(self) -> Iterator[tuple[int, int, float]]:
-        """(listener, slot, report's time) of all that listeners have said to have heard."""
+        """(listener, slot, report's time) of all that listeners have said to have heard of us."""
         for number, each in self._listeners.items():
-            for slot in np.flatnonzero(self._certain.known[each.row]).tolist():
-                yield number, slot, float(self._certain.time_s[each.row, slot])
+            for slot, time_s in each.proven.items():
+                yield number, slot, time_s
 
     def forget(self, slot: int) -> None:
         """Nobody knows this soldier any more."""
-        self.pictures.forget(slot)
-        self._certain.forget(slot)
+        for pictures in (self._certain, self._stand_ins, self.pictures):
+            pictures.forget(slot)
+        for each in self._listeners.values():
+            each.proven.pop(slot, None)
 
     def clear(self) -> None:
         """Nobody knows anything."""
         self._listeners.clear()
+        self._heard_ns.clear()
         self._sent.clear()
         self._certain = Pictures(0, self._slots)
-        self.pictures = Pictures(1 if self.loss < LOSSLESS else ROWS, self._slots)
+        self._stand_ins = Pictures(1 if self.loss < LOSSLESS else ROWS, self._slots)
+        self.pictures = self._stand_ins
 
     def spoke(self, counter: int, spoken: Spoken) -> None:
         """Our frame is on the air."""
         self._sent.append((counter, spoken))
-        self.pictures.hear(self._by_chance(self.pictures.rows), spoken)
+        self._may_hear(spoken)
 
     def overheard(self, spoken: Spoken) -> None:
         """Somebody else's frame was on the air."""
-        self.pictures.hear(self._by_chance(self.pictures.rows), spoken)
+        self._may_hear(spoken)
         self._certain.hear(self._by_chance(self._certain.rows), spoken)
+
+    def heard_from(self, number: int, now_ns: int) -> None:
+        """Somebody on this net was heard, and so may hear us."""
+        self._heard_ns[number] = now_ns
+
+    def _may_hear(self, spoken: Spoken) -> None:
+        chance = self._by_chance(self._stand_ins.rows)
+        self._stand_ins.hear(chance, spoken)
+        if self.pictures is not self._stand_ins:
+            # The last rows are the first of the stand-ins: for them it is the same chance.
+            others = self.pictures.rows - self._strangers
+            chances = np.concatenate([self._by_chance(others), chance[: self._strangers]])
+            self.pictures.hear(chances, spoken)
 
     def _by_chance(self, rows: int) -> BoolArray:
         if self.loss < LOSSLESS:
@@ -95,13 +129,11 @@ class Listeners:
         if not self._sent:
             return
         newest = self._newest(feedback)
-        known = self._listeners.get(listener)
-        if known is None:
-            known = self._new_listener(listener, newest - feedback.span - 1, now_ns)
+        known = self._listeners.get(listener) or self._new_listener(listener, now_ns)
         known.told_ns = now_ns
         for counter, spoken in self._sent:
             if known.counter < counter <= newest:
-                self._settle(known.row, spoken, _was_heard(feedback, newest - counter))
+                self._settle(known, spoken, _was_heard(feedback, newest - counter))
         known.counter = max(known.counter, newest)
         self._drop_silent(now_ns)
         self._deal()
@@ -111,24 +143,31 @@ class Listeners:
         last = self._sent[-1][0]
         return last - (last - feedback.newest) % COUNTER_MODULUS
 
-    def _settle(self, row: int, spoken: Spoken, heard: bool) -> None:
-        """One frame of which it is known now whether it was heard."""
-        there = np.arange(self._certain.rows) == row
-        self._certain.hear(there & heard, spoken, there)
-        self.loss += _LEARNING * ((not heard) - self.loss)
+    def _settle(self, listener: _Listener, spoken: Spoken, heard: bool | None) -> None:
+        """One frame of which it is known now whether it was heard; None: it is not, so it is taken as missed."""
+        certain, row = self._certain, listener.row
+        there = np.arange(certain.rows) == row
+        certain.hear(there & bool(heard), spoken, there)
+        for slot, time_s in zip(spoken.slots.tolist(), spoken.time_s.tolist(), strict=True):
+            if heard and certain.known[row, slot] and certain.time_s[row, slot] == time_s:
+                listener.proven[slot] = time_s
+        if heard is not None:
+            self.loss += _LEARNING * ((not heard) - self.loss)
 
-    def _new_listener(self, listener: int, counter: int, now_ns: int) -> _Listener:
-        """Begins with what a stand-in has."""
+    def _new_listener(self, listener: int, now_ns: int) -> _Listener:
+        """Begins with nothing: what it has is what it says to have heard."""
         certain = Pictures(self._certain.rows + 1, self._slots)
         for row in range(self._certain.rows):
             certain.copy(row, self._certain, row)
-        certain.copy(self._certain.rows, self.pictures, 0)
         self._certain = certain
-        self._listeners[listener] = _Listener(certain.rows - 1, counter, now_ns)
+        self._listeners[listener] = _Listener(certain.rows - 1, -1, now_ns)
         return self._listeners[listener]
 
     def _drop_silent(self, now_ns: int) -> None:
-        """Who has told nothing for long is one of the others again."""
+        """Who has told nothing for long is one of the others again; who was not heard for long is gone."""
+        self._heard_ns = {
+            number: at_ns for number, at_ns in self._heard_ns.items() if now_ns - at_ns <= _SILENT_NS
+        }
         silent = [number for number, each in self._listeners.items() if now_ns - each.told_ns > _SILENT_NS]
         for number in silent:
             del self._listeners[number]
@@ -141,13 +180,18 @@ class Listeners:
 
     def _deal(self) -> None:
         """Give every listener its share of rows: its certain picture, and by chance what it has not told of yet."""
-        copies = max(1, ROWS // len(self._listeners))
-        pictures = Pictures(copies * len(self._listeners), self._slots)
-        since = np.zeros(pictures.rows, dtype=np.int64)
+        shares = len(self._listeners) + (not self.all_tell)
+        copies = max(1, ROWS // shares)
+        told = copies * len(self._listeners)
+        self._strangers = 0 if self.all_tell else min(copies, self._stand_ins.rows)
+        pictures = Pictures(told + self._strangers, self._slots)
+        since = np.full(pictures.rows, _NONE_OPEN, dtype=np.int64)
         for index, each in enumerate(self._listeners.values()):
             for row in range(index * copies, (index + 1) * copies):
                 pictures.copy(row, self._certain, each.row)
                 since[row] = each.counter
+        for row in range(self._strangers):
+            pictures.copy(told + row, self._stand_ins, row)
         for counter, spoken in self._sent:
             open_yet = counter > since
             if open_yet.any():
@@ -155,6 +199,8 @@ class Listeners:
         self.pictures = pictures
 
 
-def _was_heard(feedback: Feedback, before: int) -> bool:
-    """Whether the frame so many before the newest was heard; what lies beyond the bits was not, to be safe."""
-    return before == 0 or (before <= feedback.span and bool(feedback.heard >> (before - 1) & 1))
+def _was_heard(feedback: Feedback, before: int) -> bool | None:
+    """Whether the frame so many before the newest was heard; None if it lies beyond the bits."""
+    if before == 0:
+        return True
+    return bool(feedback.heard >> (before - 1) & 1) if before <= feedback.span else None

@@ -29,7 +29,8 @@ from sa_hub.radio.meter import LinkMeter
 from sa_hub.radio.quantise import resolution_for
 from sa_hub.radio.references import References
 from sa_hub.radio.relevance import Relevance
-from sa_hub.radio.scheduler import Policy, Room, Scheduler
+from sa_hub.radio.room import Room
+from sa_hub.radio.scheduler import Policy, Scheduler
 from sa_hub.radio.seal import Opened, Opener, Sealer
 
 _AMPLE: Final = 0.75
@@ -131,14 +132,18 @@ class RadioNet:
         """An update as the reports that it means to us; takes in what the sender tells of our own frames."""
         sender, epoch, counter = opened.sender, opened.epoch, opened.counter
         self._references.heard(sender, epoch, counter)
+        self.scheduler.listeners.heard_from(sender, now_ns)
         if not isinstance(content, Reports | Update):
             return None
         if content.feedback is not None and content.feedback.about == self._number:
-            self.scheduler.listeners.told(sender, content.feedback, now_ns)
+            self.scheduler.told_what_was_heard(sender, content.feedback, now_ns)
         if isinstance(content, Reports):
             self._references.told(sender, epoch, counter, content, now_ns)
+            others = [report.number for report in content.reports if report.number != sender]
+            if others:
+                self._hearing.heard_telling(sender, epoch, counter, others)
             return None
-        self._hearing.heard_update(sender, epoch, counter, (entry.number for entry in content.entries))
+        self._hearing.heard_telling(sender, epoch, counter, (entry.number for entry in content.entries))
         return Reports(self._references.resolve(sender, epoch, counter, content, now_ns))
 
     @property
@@ -185,7 +190,7 @@ class RadioNet:
             plan = self.scheduler.plan(candidates, self._room(now_ns), now_ns, urged=urged)
             if plan is None:
                 return
-            feedback = self._hearing.due(self._references.in_order)
+            feedback = self._hearing.due(self._references.in_order, self.scheduler.telling_of)
             frame = self._transmit(self._fitting(replace(plan, feedback=feedback)), now_ns)
             if frame is None:
                 return
@@ -234,6 +239,12 @@ class RadioNet:
         """What is kept now: the reserve grows from a quarter of what comes in, so that a start is not silent."""
         return min(self._reserved_bits, self._bucket.earned_bits // 4)
 
+    def _kept_from(self, content: Content) -> int:
+        """What this may not spend: answers to others' alerts leave half of the reserve to our own."""
+        if isinstance(content, AlertNotice):
+            return 0
+        return self._kept_bits // 2 if _is_urgent(content) else self._kept_bits
+
     def _payload_limit(self, keep_bits: int) -> int:
         """Bytes left for a payload in the longest frame that link and bucket can ever let through."""
         limit = self._payload_limits.get(keep_bits)
@@ -253,7 +264,7 @@ class RadioNet:
         """Seal and pay; None if the bucket cannot pay yet."""
         payload = self._encode(content, asked)
         air_bytes = self.profile.air_bytes(len(payload) + self._sealer.overhead_bytes(now_ns))
-        if not self._bucket.take(air_bytes, now_ns, 0 if _is_urgent(content) else self._kept_bits):
+        if not self._bucket.take(air_bytes, now_ns, self._kept_from(content)):
             return None
         self.meter.sent(air_bytes, now_ns)
         frame = self._sealer.seal(payload, now_ns)
@@ -312,7 +323,7 @@ class RadioNet:
 
 
 def _is_urgent(content: Content) -> bool:
-    """What may spend the reserve."""
+    """What may spend of the reserve."""
     return isinstance(content, AlertNotice | Acknowledgement | Request)
 
 

@@ -4,6 +4,7 @@ A soldier goes along when telling is worth more than the bits at the going price
 over pays for its header and tag. (The value per bit of a study over patrols, building clearing and recorded walks.)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,8 +12,8 @@ import numpy as np
 
 from sa_hub.radio.ground import FloatArray
 from sa_hub.radio.history import allowed_cells
-from sa_hub.radio.layout import LATTICES, MISSES
-from sa_hub.radio.picture import IntArray
+from sa_hub.radio.layout import FAR_BITS, LATTICES, MISSES, NEAR_BITS
+from sa_hub.radio.picture import BoolArray, IntArray
 from sa_hub.radio.squad import MAX_SOLDIERS
 from sa_hub.radio.update_codec import MAX_ENTRIES
 
@@ -25,27 +26,44 @@ _GAP_BITS: Final = 2
 _SQUAD_ENTRY_BITS: Final = 8
 
 
+@dataclass(frozen=True)
+class _Allowed:
+    """(R,) finest cells that a prediction may be off, by the reach of the frame: as it is, or varied by entry."""
+
+    usual: FloatArray
+    near: FloatArray
+    far: FloatArray
+
+
+def _allowed(resolution: int, reaches: IntArray) -> _Allowed:
+    by_bits = (
+        [allowed_cells(resolution, reach + more) for reach in reaches.tolist()]
+        for more in (0, NEAR_BITS, FAR_BITS)
+    )
+    return _Allowed(*(np.array(cells) for cells in by_bits))
+
+
 _REACHES: Final = {
     resolution: np.array([reach for each, reach in LATTICES if each == resolution])
     for resolution in RESOLUTIONS
 }
-_ALLOWED: Final = {
-    resolution: np.array([allowed_cells(resolution, int(reach)) for reach in reaches])
-    for resolution, reaches in _REACHES.items()
-}
+_ALLOWED: Final = {resolution: _allowed(resolution, reaches) for resolution, reaches in _REACHES.items()}
 
 
 @dataclass(frozen=True)
 class Wares:
     """What there is to tell of n soldiers. ``worth`` (rows, n): of telling, by receiver; ``behind`` likewise.
 
-    ``bits`` (n,) beside the place; ``changes_bits`` (n, DEPTH) of what has changed, by how much may be missed;
+    ``bits`` (n,) beside the place, ``velocity_bits`` of them need not be told where ``steady`` (n, DEPTH) holds for
+    all that may be missed; ``changes_bits`` (n, DEPTH) of what has changed, by how much may be missed;
     ``off_cells`` (n, DEPTH) see `History.cells_off`; ``span_cells``: how far the soldiers lie apart.
     """
 
     worth: FloatArray
     behind: IntArray
     bits: FloatArray
+    velocity_bits: FloatArray
+    steady: BoolArray
     changes_bits: FloatArray
     off_cells: FloatArray
     refresh: FloatArray
@@ -57,7 +75,8 @@ class Wares:
 class Terms:
     """What bits cost: ``price`` per bit in the frame, ``frame_price`` of sending one at all, and room for how many.
 
-    ``delivered`` is the share of frames that are heard, ``least_misses`` what an update must allow for.
+    ``delivered`` is the share of frames that are heard, ``least_misses`` what an update must allow for,
+    ``entry_share``: an entry pays so much of its bits' price.
     """
 
     price: float
@@ -65,23 +84,41 @@ class Terms:
     room_bits: float
     delivered: float
     least_misses: int
+    entry_share: float = 1.0
 
 
 @dataclass(frozen=True)
 class Offer:
-    """A frame: its soldiers (indices into the wares), most urgent first, its bits; ``misses`` None: in full."""
+    """A frame: its soldiers (indices into the wares), most urgent first, its bits; ``misses`` None: in full.
+
+    ``far`` and ``steady`` (n,), where entries vary: which of them need more bits of their place, and no velocity.
+    """
 
     surplus: float
     picked: IntArray
     bits: float = 0.0
     reach_bits: int = 0
     misses: int | None = None
+    far: BoolArray | None = None
+    steady: BoolArray | None = None
+
+    @property
+    def varied(self) -> bool:
+        """Whether each entry tells its own reach, and whether its velocity is as before."""
+        return self.far is not None
+
+    def how(self, picked: Sequence[int]) -> list[tuple[bool, bool]]:
+        """Of each of these soldiers, whether it is far and steady."""
+        if self.far is None or self.steady is None:
+            return [(False, False)] * len(picked)
+        return list(zip(self.far[picked].tolist(), self.steady[picked].tolist(), strict=True))
 
 
 def best_offer(wares: Wares, terms: Terms) -> Offer | None:
     """The frame with the largest surplus; None if no frame is worth its bits."""
     offers = [_in_full(wares, terms)]
-    offers += [_update(wares, terms, misses) for misses in _allowances(wares, terms)]
+    for misses in _allowances(wares, terms):
+        offers += [_update(wares, terms, misses, varied=varied) for varied in (False, True)]
     best = max(offers, key=lambda offer: offer.surplus)
     return best if best.surplus > 0.0 else None
 
@@ -93,19 +130,28 @@ def _allowances(wares: Wares, terms: Terms) -> list[int]:
     return [misses for misses in MISSES if terms.least_misses <= misses <= enough]
 
 
-def _update(wares: Wares, terms: Terms, misses: int) -> Offer:
+def _update(wares: Wares, terms: Terms, misses: int, *, varied: bool) -> Offer:
     """The best modulus for an update that allows so much to be missed."""
     gain = terms.delivered * np.where(wares.behind <= misses, wares.worth, 0.0).mean(axis=0)
-    resolvable = wares.off_cells[:, misses] < _ALLOWED[wares.resolution][:, None]
-    reaches = _REACHES[wares.resolution]
-    bits = _GAP_BITS + wares.bits + wares.changes_bits[:, misses] + 2.0 * reaches[:, None]
-    surplus = np.where(resolvable, gain - terms.price * bits, -1.0)
+    reaches, allowed = _REACHES[wares.resolution], _ALLOWED[wares.resolution]
+    off_cells = wares.off_cells[:, misses]
+    bits = _GAP_BITS + wares.bits + wares.changes_bits[:, misses]
+    steady, far = wares.steady[:, misses], off_cells >= allowed.near[:, None]
+    if varied:
+        resolvable = off_cells < allowed.far[:, None]
+        bits = bits + 2.0 - wares.velocity_bits * steady
+        bits = bits + 2.0 * (reaches[:, None] + np.where(far, FAR_BITS, NEAR_BITS))
+    else:
+        resolvable = off_cells < allowed.usual[:, None]
+        bits = bits + 2.0 * reaches[:, None]
+    surplus = np.where(resolvable, gain - terms.entry_share * terms.price * bits, -1.0)
     totals = np.maximum(surplus, 0.0).sum(axis=1)
     best = int(np.argmax(totals))
     picked = _picked(surplus[best], bits[best], terms.room_bits - UPDATE_HEAD_BITS, MAX_ENTRIES)
-    total = float(surplus[best][picked].sum()) - terms.frame_price - terms.price * UPDATE_HEAD_BITS
     size = UPDATE_HEAD_BITS + float(bits[best][picked].sum())
-    return Offer(total if len(picked) else -1.0, picked, size, int(reaches[best]), misses)
+    total = float(surplus[best][picked].sum()) - terms.frame_price - terms.price * UPDATE_HEAD_BITS
+    variation = (far[best], steady) if varied else (None, None)
+    return Offer(total if len(picked) else -1.0, picked, size, int(reaches[best]), misses, *variation)
 
 
 def _in_full(wares: Wares, terms: Terms) -> Offer:
@@ -113,7 +159,7 @@ def _in_full(wares: Wares, terms: Terms) -> Offer:
     gain = terms.delivered * wares.worth.mean(axis=0) + wares.refresh
     place_bits = 2.0 * np.ceil(np.log2(wares.span_cells + 1.0))
     bits = _SQUAD_ENTRY_BITS + place_bits + wares.bits
-    surplus = gain - terms.price * bits
+    surplus = gain - terms.entry_share * terms.price * bits
     picked = _picked(surplus, bits, terms.room_bits - SQUAD_HEAD_BITS, MAX_SOLDIERS)
     total = float(surplus[picked].sum()) - terms.frame_price - terms.price * SQUAD_HEAD_BITS
     return Offer(total if len(picked) else -1.0, picked, SQUAD_HEAD_BITS + float(bits[picked].sum()))

@@ -130,9 +130,10 @@ def resolved(grid: Grid, reference: Report, update: Update, entry: Entry, tick: 
     place = reference.latitude_deg, reference.longitude_deg
     velocity = reference.east_m_s, reference.north_m_s
     latitude_deg, longitude_deg = moved_deg(*place, velocity, time_ns - reference.time_ns)
-    mask = (1 << update.reach_bits) - 1
-    row = grid.row_nearest(entry.row & mask, update.reach_bits, latitude_deg, update.resolution)
-    column = grid.column_nearest(entry.column & mask, update.reach_bits, longitude_deg, update.resolution)
+    reach_bits = update.reach_of(entry)
+    mask = (1 << reach_bits) - 1
+    row = grid.row_nearest(entry.row & mask, reach_bits, latitude_deg, update.resolution)
+    column = grid.column_nearest(entry.column & mask, reach_bits, longitude_deg, update.resolution)
     if not q.is_row(row, update.resolution):
         return None
     return _at(reference, grid.centre_deg(row, column, update.resolution), entry, time_ns, update.resolution)
@@ -143,6 +144,8 @@ def _at(
 ) -> Report:
     """The reference with what the entry changes; the place told is that of the frame's time."""
     velocity = q.velocity_of(*entry.velocity) if entry.velocity else (0.0, 0.0)
+    if entry.steady:
+        velocity = reference.east_m_s, reference.north_m_s
     age_ns = entry.age_ticks * q.TICK_NS
     if age_ns:
         east_m_s, north_m_s = velocity

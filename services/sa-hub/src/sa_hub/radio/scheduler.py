@@ -15,7 +15,7 @@ import numpy as np
 
 from bootprint.clock import NS_PER_S
 from sa_hub.radio import quantise as q
-from sa_hub.radio.content import Report, Reports, Update
+from sa_hub.radio.content import Feedback, Report, Reports, Update
 from sa_hub.radio.grid import Grid
 from sa_hub.radio.ground import FloatArray
 from sa_hub.radio.history import History
@@ -26,7 +26,9 @@ from sa_hub.radio.pacing import Pacing
 from sa_hub.radio.persistence import LONGEST_S, Persistence
 from sa_hub.radio.picture import Spoken
 from sa_hub.radio.references import resolved
+from sa_hub.radio.refreshing import Refreshing, longest_pause_s
 from sa_hub.radio.relevance import Relevance
+from sa_hub.radio.room import Room
 from sa_hub.radio.telling import FRESH_NS, Telling
 from sa_hub.radio.wares import Candidates, candidates_of, samples_of, worth
 
@@ -40,18 +42,15 @@ CLOCK_SET_BACK_NS: Final = 60 * NS_PER_S
 STANDING_M_S: Final = 0.3
 _CHANGE_WORTH: Final = 3.0
 _AGE_BITS: Final = 8.0
-_REFRESH_WORTH: Final = 5.0
-_REFRESH_S: Final = 12.0
-_REFRESH_LIMITS_S: Final = (60.0, 600.0)
-_FIRST_REFRESH_S: Final = (5.0, 1.0)
-_OVERDUE_S: Final = 20.0
-_REFRESH_AGE_NS: Final = 10 * NS_PER_S
-_CHEAP_REFRESH_S: Final = 15.0
 _CHEAP_MISSES: Final = 3
 """Where bits are cheap, what is told is proof against surprises: more may be missed, all goes in full often."""
 _URGED_WORTH: Final = 50.0
-_UNSURE: Final = 5e-4
-_ENTRY_BITS: Final = 18.0
+_UNSURE: Final = 5e-5
+SURE_MISSES: Final = 2
+"""What updates allow for in any case where frames are lost: feedback is never of the last one."""
+LOSSY_SHARE: Final = 0.15
+"""Of the price of an entry's bits where frames are lost: who is told in every frame is never long wrong, and his
+place, told against what is fresh, takes few bits. Counting only what is wrong now would leave him out."""
 PERIOD_NS: Final = 200_000_000
 """Time between decisions."""
 _LONGEST_ELAPSED_S: Final = 10.0
@@ -64,25 +63,6 @@ class Policy:
     threshold_m: float = 5.0
     heartbeat_s: float = 30.0
     loss: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Room:
-    """What the budget allows: bits free now, of how many at most, per second; and the longest payload that can go.
-
-    ``frame_bits``: the next frame's header and tag on the air; ``bits_per_bit``: what a payload's bit costs there.
-    """
-
-    free_bits: float
-    depth_bits: float
-    rate_bits_per_s: float
-    payload_bits: float
-    frame_bits: float
-    bits_per_bit: float = 1.0
-
-    def interval_s(self, soldiers: int) -> float:
-        """Time between two reports of a soldier, when so many share the budget."""
-        return (self.frame_bits + _ENTRY_BITS * self.bits_per_bit * soldiers) / self.rate_bits_per_s
 
 
 class Scheduler:
@@ -99,7 +79,8 @@ class Scheduler:
         self._persistence = Persistence()
         self._slots: dict[int, int] = {}
         self._heard_ns: dict[int, int] = {}
-        self._full_ns: dict[int, tuple[int, int]] = {}
+        self._overheard: dict[int, Report] = {}
+        self._refreshing = Refreshing()
         self._base_ns: int | None = None
         self._planned_ns: int | None = None
         self._latest: Candidates | None = None
@@ -108,19 +89,32 @@ class Scheduler:
 
     def told(self, report: Report) -> None:
         """Somebody else's report was on the air: the net has it, and we need not tell it."""
-        self._heard_ns[report.number] = max(report.time_ns, self._heard_ns.get(report.number, report.time_ns))
-        self.listeners.overheard(self._spoken([report], None, ours=False))
+        newest_ns = self._heard_ns.get(report.number)
+        if newest_ns is None or report.time_ns >= newest_ns:
+            self._heard_ns[report.number] = report.time_ns
+            self._overheard[report.number] = report
+
+    def told_what_was_heard(self, listener: int, feedback: Feedback, now_ns: int) -> None:
+        """A hub tells which of our frames it heard."""
+        self._note_overheard()  # before, for it says nothing of what a new listener heard of others
+        self.listeners.told(listener, feedback, now_ns)
+
+    def _note_overheard(self) -> None:
+        """Listeners have heard it, too. Asked for seldom: who does not relay tells of nobody but himself."""
+        if self._overheard:
+            self.listeners.overheard(self._spoken(tuple(self._overheard.values()), None, ours=False))
+            self._overheard.clear()
 
     def sent(self, counter: int, content: object, now_ns: int) -> None:
         """Our frame with this counter was on the air; ``content`` as a receiver decodes it."""
+        if counter == 0:
+            self._history.epoch_begins()
         reports, misses = self._meant(content, now_ns)
         spoken = self._spoken(reports, misses, ours=True)
         self.listeners.spoke(counter, spoken)
         self._history.spoke(spoken, reports)
         if misses is None:
-            for report in reports:
-                _, times = self._full_ns.get(report.number, (now_ns, -1))
-                self._full_ns[report.number] = now_ns, times + 1
+            self._refreshing.told_in_full(reports, now_ns)
 
     def _meant(self, content: object, now_ns: int) -> tuple[tuple[Report, ...], int | None]:
         """The reports of a frame as receivers have them, and what it allows to be missed."""
@@ -138,6 +132,7 @@ class Scheduler:
 
     def forget(self, numbers: Iterable[int]) -> None:
         """Take these as never told, so that they are reported anew and in full."""
+        self._note_overheard()
         for number in numbers:
             self.listeners.forget(self._slot(number))
             self._history.forget(self._slot(number))
@@ -153,9 +148,10 @@ class Scheduler:
 
     def begin_again(self) -> None:
         """Nothing that was told before counts: all is told anew and in full."""
+        self._overheard.clear()
         self.listeners.clear()
         self._history.clear()
-        self._full_ns.clear()
+        self._refreshing.clear()
 
     def _slot(self, number: int) -> int:
         """Where a soldier's values stand in all arrays."""
@@ -203,10 +199,13 @@ class Scheduler:
         if not news:
             self._latest = None
             return None
+        if any(each.number in self._overheard for each in news):
+            self._note_overheard()
         telling = self._telling(news, room, now_ns)
         value, terms = self._worth(telling), self._terms(room)
         value += [urged * _URGED_WORTH * (number == self._own) for number in telling.who.numbers]
-        refresh = self._refresh(telling.who, now_ns)
+        pause_s = longest_pause_s(self.listeners, cheap=self._is_cheap)
+        refresh = self._refreshing.worth(telling.who, now_ns, pause_s, cheap=self._is_cheap)
         if not _may_pay(value.mean(axis=0) + refresh, terms):
             return None
         offer = best_offer(self._wares(telling, value, refresh), terms)
@@ -238,9 +237,15 @@ class Scheduler:
 
     def known_by_listeners(self) -> Iterator[tuple[int, int, int]]:
         """(listener, soldier, time of the report) of what hubs that give feedback are sure to know."""
+        self._note_overheard()
         numbers = {slot: number for number, slot in self._slots.items()}
         for listener, slot, time_s in self.listeners.certain():
             yield listener, numbers[slot], (self._base_ns or 0) + round(time_s * NS_PER_S)
+
+    @property
+    def telling_of(self) -> int:
+        """How many soldiers this net is told of."""
+        return 0 if self._latest is None else len(self._latest.reports)
 
     def _is_news(self, report: Report, now_ns: int) -> bool:
         """What the net told itself is not to be told to it, nor an old report of ourselves.
@@ -270,7 +275,13 @@ class Scheduler:
         self._latest = who
         velocity = who.velocity * shares[:, None]
         velocity = np.where(np.hypot(*velocity.T)[:, None] < STANDING_M_S, 0.0, velocity)
+        if self.listeners.loss >= LOSSLESS:
+            velocity = self._history.as_told(slots, velocity)
         return Telling(who, velocity, self._resolution(), now_ns, self._history, self._grid)
+
+    @property
+    def _is_cheap(self) -> bool:
+        return self._pacing.price < CHEAP[0]
 
     def _resolution(self) -> int:
         """Finer cells when bits are cheap."""
@@ -290,11 +301,14 @@ class Scheduler:
     def _wares(self, telling: Telling, value: FloatArray, refresh: FloatArray) -> Wares:
         who = telling.who
         old = who.now_s - who.time_s > FRESH_NS / NS_PER_S
+        velocity_bits = np.where(telling.velocity.any(axis=1), 1.0 + MOTION_BITS, 1.0)
         off_cells = self._history.cells_off(who.slots, *telling.aimed(), who.now_s)
         return Wares(
             worth=value,
             behind=self.listeners.pictures.behind(who.slots),
-            bits=1.0 + MOTION_BITS * telling.velocity.any(axis=1) + _AGE_BITS * old,
+            bits=velocity_bits + _AGE_BITS * old,
+            velocity_bits=velocity_bits,
+            steady=self._history.steady(who.slots, telling.velocity),
             changes_bits=telling.changes_bits(),
             off_cells=np.where(telling.out_of_reach()[:, None], np.inf, off_cells),
             refresh=refresh,
@@ -302,39 +316,16 @@ class Scheduler:
             resolution=telling.resolution,
         )
 
-    def _refresh(self, who: Candidates, now_ns: int) -> FloatArray:
-        """(n,) what it is worth to tell in full again, for whoever can resolve nothing of a soldier.
-
-        The first times soon, since a first frame may be missed, then after ever longer pauses.
-        """
-        loss, cheap = self.listeners.loss, self._pacing.price < CHEAP[0]
-        if self.listeners.tell and not cheap:
-            return np.zeros(len(who.reports))
-        low, high = _REFRESH_LIMITS_S
-        longest_s = _CHEAP_REFRESH_S if cheap else min(max(_REFRESH_S / max(loss, LOSSLESS), low), high)
-        first_s = _FIRST_REFRESH_S[cheap]
-        overdue = [
-            self._overdue(number, now_ns, first_s, longest_s) * (now_ns - report.time_ns < _REFRESH_AGE_NS)
-            for number, report in zip(who.numbers, who.reports, strict=True)
-        ]
-        return _REFRESH_WORTH * np.array(overdue, dtype=np.float64)
-
-    def _overdue(self, number: int, now_ns: int, first_s: float, longest_s: float) -> float:
-        """How urgently a soldier that was told in full some times is to be so again: 0 within its pause, then 1,
-        and within the next minutes ever more, so that no price keeps a receiver in the dark for long."""
-        last_ns, times = self._full_ns.get(number, (now_ns, 0))
-        late_s = (now_ns - last_ns) / NS_PER_S - min(first_s * 2.0 ** min(times, 16), longest_s)
-        return 1.0 + (late_s / _OVERDUE_S) ** 2 if late_s > 0.0 else 0.0
-
     def _terms(self, room: Room) -> Terms:
         loss = self.listeners.loss
-        certain = 0 if self.listeners.tell else _least_misses(loss)
+        certain = (SURE_MISSES if loss >= LOSSLESS else 0) if self.listeners.all_tell else _least_misses(loss)
         return Terms(
             price=self._pacing.price * room.bits_per_bit,
             frame_price=self._pacing.price * room.frame_bits,
             room_bits=room.payload_bits,
             delivered=1.0 if loss < LOSSLESS else 1.0 - loss,
-            least_misses=max(certain, _CHEAP_MISSES) if self._pacing.price < CHEAP[0] else certain,
+            entry_share=1.0 if loss < LOSSLESS else LOSSY_SHARE,
+            least_misses=max(certain, _CHEAP_MISSES) if self._is_cheap else certain,
         )
 
 

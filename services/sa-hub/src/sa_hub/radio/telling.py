@@ -26,6 +26,8 @@ _QUALITY_BITS: Final = 10
 _LEVEL_BITS: Final = 3
 _FLOOR_BITS: Final = 7
 _HEIGHT_BITS: Final = 8
+_LEVEL_REPEATS: Final = 2
+"""Entries in which a new level is told at least; who misses them all has the old one until told in full again."""
 _HEIGHT_REACH_M: Final = 50.0
 """Of low bits that mean ±128 m, since a receiver may have stayed with an older height."""
 
@@ -72,7 +74,9 @@ class Telling:
         told = self.history.told
         pairs = zip(self.who.slots.tolist(), self.who.reports, strict=True)
         codes = [details_code(report, told.get(slot)) for slot, report in pairs]
-        return self.history.details_differ(self.who.slots, np.array(codes, dtype=np.int64))
+        differ = self.history.details_differ(self.who.slots, np.array(codes, dtype=np.int64))
+        differ[:, _LEVEL_REPEATS:, 1] = differ[:, _LEVEL_REPEATS - 1, 1, None]
+        return differ
 
     def changes_bits(self) -> FloatArray:
         """(n, DEPTH) what telling the changes takes, by how much may be missed."""
@@ -117,11 +121,14 @@ class Telling:
         picked = sorted(offer.picked.tolist(), key=lambda index: self.who.reports[index].number)
         latitude, longitude = self.aimed()
         changes = self.changes()[:, misses]
-        entries = [
-            self._entry(index, (float(latitude[index]), float(longitude[index])), changes[index])
-            for index in picked
-        ]
-        return Update(q.tick_of(self.now_ns), self.resolution, offer.reach_bits, misses, tuple(entries))
+        entries = tuple(
+            _varied(
+                self._entry(index, (float(latitude[index]), float(longitude[index])), changes[index]), how
+            )
+            for index, how in zip(picked, offer.how(picked), strict=True)
+        )
+        tick = q.tick_of(self.now_ns)
+        return Update(tick, self.resolution, offer.reach_bits, misses, entries, varied=offer.varied)
 
     def _entry(self, index: int, place_deg: tuple[float, float], changed: BoolArray) -> Entry:
         report, told = self.who.reports[index], self.history.told.get(int(self.who.slots[index]))
@@ -135,6 +142,12 @@ class Telling:
             quality=quality_to_tell(report, told) if changed[0] else None,
             level=level_to_tell(report, told) if changed[1] else None,
         )
+
+
+def _varied(entry: Entry, how: tuple[bool, bool]) -> Entry:
+    """The entry with more bits of its place, or without velocity, as the frame's offer has it."""
+    far, steady = how
+    return replace(entry, far=far, steady=steady, velocity=None if steady else entry.velocity)
 
 
 def _as_of(report: Report, now_ns: int) -> Report:

@@ -11,7 +11,19 @@ from sa_hub.radio import quantise as q
 from sa_hub.radio.bits import BitReader, BitWriter
 from sa_hub.radio.content import Entry, Feedback, Level, Quality, Update
 from sa_hub.radio.errors import FrameError
-from sa_hub.radio.layout import ENTRY, FEEDBACK, LATTICES, MISSES, UPDATE, read_fields, write_fields
+from sa_hub.radio.layout import (
+    ENTRY,
+    FAR_BITS,
+    FAR_REACH,
+    FEEDBACK,
+    LATTICES,
+    MISSES,
+    NEAR_BITS,
+    NEAR_REACH,
+    UPDATE,
+    read_fields,
+    write_fields,
+)
 from sa_hub.radio.report_codec import MAX_NUMBER
 
 MAX_ENTRIES: Final = 64
@@ -26,7 +38,9 @@ _GAP_CODES: Final = 4
 _LEAST_ENTRY: Final = 7
 _USUAL: Final = tuple(LATTICES.index(lattice) for lattice in ((3, 3), (3, 4)))
 
-_DEFAULTS: Final = dict.fromkeys(("misses", "paced", "detailed", "aged", "gap_code"), 0)
+_DEFAULTS: Final = dict.fromkeys(
+    ("misses", "paced", "detailed", "aged", "varied", "gap_code", "far", "steady"), 0
+)
 
 Values = Mapping[str, int]
 
@@ -53,7 +67,7 @@ def _entries(update: Update, numbers: Sequence[int], frame: Values) -> BitWriter
     for previous, entry in zip([None, *numbers], update.entries, strict=False):
         if previous is not None:
             writer.put_rice(entry.number - previous - 1, 2 * frame["gap_code"])
-        values = _entry_values(entry, update.reach_bits, paced=bool(frame["paced"]))
+        values = _entry_values(entry, update.reach_of(entry), paced=bool(frame["paced"]))
         write_fields(writer, ENTRY, {**frame, **values})
     return writer
 
@@ -63,13 +77,14 @@ def read_update(reader: BitReader, sender: int) -> tuple[bool, Update]:
     frame = _DEFAULTS | read_fields(reader, UPDATE, {})
     lattice = _USUAL[frame["wide"]] if frame["usual"] else frame["lattice"]
     resolution, reach = LATTICES[lattice]
-    frame["reach"] = reach
+    frame |= _reaches(reach)
     update = Update(
         tick=frame["time"],
         resolution=resolution,
         reach_bits=reach,
         misses=MISSES[frame["misses"]],
         entries=tuple(_read_entries(reader, frame, sender)),
+        varied=bool(frame["varied"]),
     )
     return bool(frame["exercise"]), update
 
@@ -116,6 +131,11 @@ def best_gap_code(numbers: Sequence[int]) -> int:
     return min(range(_GAP_CODES), key=lambda code: sum((gap >> 2 * code) + 1 + 2 * code for gap in gaps))
 
 
+def _reaches(reach: int) -> dict[str, int]:
+    """The widths that the layout knows by these names."""
+    return {"reach": reach, NEAR_REACH: reach + NEAR_BITS, FAR_REACH: reach + FAR_BITS}
+
+
 def _frame_values(update: Update, numbers: Sequence[int], sender: int) -> dict[str, int]:
     beside = numbers[0] - sender + _BESIDE
     paced = any(entry.velocity and entry.velocity[1] not in q.PACES for entry in update.entries)
@@ -126,15 +146,18 @@ def _frame_values(update: Update, numbers: Sequence[int], sender: int) -> dict[s
     lattice = LATTICES.index((update.resolution, update.reach_bits))
     return {
         "time": update.tick % TIME_MODULUS,
-        "usual": int(plain and update.misses == 0 and lattice in _USUAL and gap_code == 0),
+        "usual": int(
+            plain and not update.varied and update.misses == 0 and lattice in _USUAL and gap_code == 0
+        ),
         "wide": int(lattice == _USUAL[1]),
         "lattice": lattice,
-        "reach": update.reach_bits,
+        **_reaches(update.reach_bits),
         "misses": MISSES.index(update.misses),
         "plain": int(plain),
         "paced": int(paced),
         "detailed": int(detailed),
         "aged": int(aged),
+        "varied": int(update.varied),
         "still": int(not any(entry.velocity for entry in update.entries)),
         "own": int(numbers == [sender]),
         "near": int(0 <= beside < 2 * _BESIDE),
@@ -149,6 +172,8 @@ def _entry_values(entry: Entry, reach_bits: int, *, paced: bool) -> dict[str, in
     direction, speed = entry.velocity or (0, 0)
     quality, level = entry.quality or Quality(0, 0, 0, 0), entry.level or Level(None, None)
     return {
+        "far": int(entry.far),
+        "steady": int(entry.steady),
         "east": entry.column % (1 << reach_bits),
         "north": entry.row % (1 << reach_bits),
         "age": q.age_code(entry.age_ticks),
@@ -185,6 +210,8 @@ def _entry(number: int, values: Values) -> Entry:
         age_ticks=q.age_ticks(values.get("age", 0)),
         quality=_quality(values) if values.get("quality") else None,
         level=_level(values) if values.get("level") else None,
+        far=bool(values.get("far")),
+        steady=bool(values.get("steady")),
     )
 
 

@@ -13,6 +13,7 @@ import structlog
 from bootprint.errors import RecordingError
 from sensor_gateway.recordings import (
     bus_recording,
+    camera_folder,
     chest_xsens,
     dualfoot_fgo,
     foot_gcp,
@@ -43,6 +44,7 @@ def _no_runs(_: Path) -> list[Run]:
 
 FOLDERS: tuple[Format, ...] = (
     Format("run folder", run_folder.recognises_folder, run_folder.read_folder),
+    Format("camera folder", camera_folder.recognises, camera_folder.read),
     Format("dualfoot-fgo", dualfoot_fgo.recognises_folder, dualfoot_fgo.read_folder),
     Format("gaitmap-example", gaitmap_example.recognises_folder, gaitmap_example.read_folder),
     Format("phyphox", phyphox.recognises_folder, phyphox.read_folder),

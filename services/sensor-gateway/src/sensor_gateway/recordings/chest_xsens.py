@@ -35,13 +35,5 @@ def read(path: Path) -> list[Run]:
     time_s = (data[:, 0] - data[0, 0]) * _TICK_S
     force_scale = 1.0 if exported else STANDARD_GRAVITY_M_S2
     imu = imu_series(path, time_s, data[:, 1:4] * force_scale, data[:, 4:7], data[:, 7:10] * _FIELD_UT)
-    return [
-        Run(
-            name=path.stem,
-            kind="body",
-            path=path,
-            imus={"body": imu},
-            pressure=None if exported else PressureSeries(time_s, data[:, 10] * _PA_PER_HPA),
-            source=SOURCE,
-        )
-    ]
+    pressure = None if exported else PressureSeries(time_s, data[:, 10] * _PA_PER_HPA)
+    return [Run.worn(path, imu, SOURCE, pressure=pressure)]

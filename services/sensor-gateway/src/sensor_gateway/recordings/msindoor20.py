@@ -64,16 +64,7 @@ def read(path: Path) -> list[Run]:
         None if mag is None else phone_ahead(resampled(accel[:, 0], mag)),
     )
     points = tables[_POINT]
-    return [
-        Run(
-            name=path.stem,
-            kind="body",
-            path=path,
-            imus={"body": imu},
-            truth={"body": _truth(path, points, zero_s)} if len(points) else {},
-            source=SOURCE,
-        )
-    ]
+    return [Run.worn(path, imu, SOURCE, _truth(path, points, zero_s) if len(points) else None)]
 
 
 def _truth(path: Path, points: FloatArray, zero_s: float) -> Truth:

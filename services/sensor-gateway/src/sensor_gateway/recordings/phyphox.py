@@ -34,16 +34,8 @@ def read_folder(folder: Path) -> list[Run]:
     """The folder's one walk, without truth."""
     accel = _series(folder / _ACCEL)
     zero_s = float(accel[0, 0])
-    return [
-        Run(
-            name=folder.resolve().name,
-            kind="body",
-            path=folder,
-            imus={"body": _imu(folder, accel)},
-            gnss=_fixes(folder / _PLACE, zero_s) if (folder / _PLACE).exists() else None,
-            source=SOURCE,
-        )
-    ]
+    fixes = _fixes(folder / _PLACE, zero_s) if (folder / _PLACE).exists() else None
+    return [Run.worn(folder, _imu(folder, accel), SOURCE, gnss=fixes)]
 
 
 def _imu(folder: Path, accel: FloatArray) -> ImuSeries:

@@ -31,13 +31,15 @@ class Truth:
     """A reference track: ``time_s`` (k,), ``position_m`` (k, 3) right-handed, z up (NaN where unknown).
 
     ``at_stances``: truth and sensor are different points of the foot, so compare only while the foot stands.
-    ``strides``: how many strides the walk has, where the source counted them.
+    ``strides``: how many strides the walk has, where the source counted them. ``floor`` (k,): by number, NaN where
+    unknown.
     """
 
     time_s: FloatArray
     position_m: FloatArray
     at_stances: bool = False
     strides: int | None = None
+    floor: FloatArray | None = None
 
     @property
     def has_height(self) -> bool:
@@ -85,6 +87,21 @@ class CameraSeries:
 
 
 @dataclass(frozen=True, slots=True)
+class StereoSeries:
+    """Rectified stereo pairs as files: ``time_s`` (n,), paths, projection matrices (3, 4).
+
+    ``attitude`` (3, 3): of the camera's body (forward, left, up) in the run's frame at the start.
+    """
+
+    time_s: FloatArray
+    left: tuple[Path, ...]
+    right: tuple[Path, ...]
+    left_projection: FloatArray
+    right_projection: FloatArray
+    attitude: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
 class RangeSeries:
     """Ranges: ``time_s`` (n,), the ``peer`` of each, ``distance_m`` and ``sigma_m`` (n,), NaN if unknown."""
 
@@ -111,14 +128,33 @@ class Run:
     gnss: GnssSeries | None = None
     camera: CameraSeries | None = None
     ranges: RangeSeries | None = None
+    stereo: StereoSeries | None = None
     origin: tuple[float, float, float] | None = None
     source: str = ""
 
+    @staticmethod
+    def worn(
+        path: Path,
+        imu: ImuSeries,
+        source: str,
+        truth: Truth | None = None,
+        pressure: PressureSeries | None = None,
+        gnss: GnssSeries | None = None,
+    ) -> "Run":
+        """A walk with one unit on the body, named as its file or folder."""
+        name = path.stem if path.is_file() else path.resolve().name
+        known = {} if truth is None else {"body": truth}
+        return Run(name, "body", path, {"body": imu}, known, pressure, gnss, source=source)
+
     @property
     def duration_s(self) -> float:
-        """From the first inertial sample to the last."""
+        """From the first inertial sample (of a camera: pair, or motion) to the last."""
         starts = [imu.time_s[0] for imu in self.imus.values()]
         ends = [imu.time_s[-1] for imu in self.imus.values()]
+        if not starts and self.stereo is not None:
+            starts, ends = [self.stereo.time_s[0]], [self.stereo.time_s[-1]]
+        if not starts and self.camera is not None and len(self.camera.time_s):
+            starts, ends = [self.camera.start_time_s[0]], [self.camera.time_s[-1]]
         return float(max(ends) - min(starts)) if starts else 0.0
 
     def offers(self, kind: Kind) -> bool:
@@ -128,7 +164,7 @@ class Run:
             "foot": feet > 0,
             "dual": feet == 2,
             "body": "body" in self.imus,
-            "camera": self.camera is not None,
+            "camera": self.camera is not None or self.stereo is not None,
         }
         return wanted[kind]
 

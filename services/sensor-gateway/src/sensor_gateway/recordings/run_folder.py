@@ -2,7 +2,7 @@
 
 Any of ``left_foot.csv right_foot.csv body.csv`` (``time_s,ax,ay,az,gx,gy,gz[,mx,my,mz]``: s, m/s², rad/s, µT,
 sensor axes as mounted), ``pressure.csv``, ``gnss.csv``, ``camera_motion.csv``, ``ranges.csv`` and ``truth.csv``
-(``time_s,east_m,north_m[,up_m]``; way-points are enough). An empty cell is unknown.
+(``time_s,east_m,north_m[,up_m][,floor]``; way-points are enough). An empty cell is unknown.
 """
 
 from collections.abc import Iterator
@@ -32,6 +32,7 @@ _MAG = ("mx", "my", "mz")
 _GNSS = ("lat_deg", "lon_deg", "alt_m", "h_acc_m", "v_acc_m", "satellites", "speed_m_s", "course_deg")
 _CAMERA = ("start_time_s", "time_s", "tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad")
 _CAMERA_DOUBT = ("translation_sigma_m", "rotation_sigma_rad", "confidence_pct")
+_LEAST_HPA, _MOST_HPA = 300.0, 1100.0  # wherever people are
 RANGES = "ranges"  # not only numbers, so it has a reader of its own
 _OPTIONAL_SENSORS = ("pressure", "gnss", "camera_motion", RANGES)
 _HEADERS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -39,7 +40,7 @@ _HEADERS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "pressure": (("time_s", "pressure_pa"), ()),
     "gnss": (("time_s", "lat_deg", "lon_deg"), _GNSS[2:]),
     "camera_motion": (_CAMERA, _CAMERA_DOUBT),
-    "truth": (("time_s", "east_m", "north_m"), ("up_m",)),
+    "truth": (("time_s", "east_m", "north_m"), ("up_m", "floor")),
 }
 
 
@@ -158,12 +159,19 @@ def _truth(table: Table) -> Truth:
     time_s, track = table.column("time_s"), table.columns("east_m", "north_m")
     if not np.isfinite(track).all() or not (np.diff(time_s) > 0.0).all():
         raise RecordingError(f"{table.path}: truth must be finite and its time_s must rise")
-    return Truth(time_s, np.column_stack([track, table.optional("up_m")]))
+    floor = table.column("floor") if "floor" in table.header[-1] else None
+    return Truth(time_s, np.column_stack([track, table.optional("up_m")]), floor=floor)
 
 
 def pressure_of(table: Table) -> PressureSeries:
-    """A barometer's table as a series."""
-    return PressureSeries(table.column("time_s"), table.column("pressure_pa"))
+    """A barometer's table as a series; RecordingError where it is in hectopascals."""
+    pressure = table.column("pressure_pa")
+    known = pressure[np.isfinite(pressure)]
+    if len(known) and _LEAST_HPA < float(np.median(known)) < _MOST_HPA:
+        raise RecordingError(
+            f"{table.path}: pressure_pa is about {np.median(known):.0f}: must be Pa, not hPa"
+        )
+    return PressureSeries(table.column("time_s"), pressure)
 
 
 def gnss_of(table: Table) -> GnssSeries:

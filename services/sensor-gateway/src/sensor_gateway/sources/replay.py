@@ -66,7 +66,23 @@ def open_recording(path: Path, settings: ReplaySource, identity: Identity) -> Re
         from sensor_gateway.sources.bus_replay import BusRecording  # brings the MCAP library
 
         return BusRecording(path, identity, settings.soldier or identity.soldier)
+    if _is_camera(path):
+        return _open_camera(path, settings.run, identity)
     return RunRecording(_open_run(path, settings.run), settings, identity)
+
+
+def _is_camera(path: Path) -> bool:
+    from sensor_gateway.recordings import camera_folder
+
+    return path.is_dir() and camera_folder.recognises(path)
+
+
+def _open_camera(path: Path, name: str | None, identity: Identity) -> Recording:
+    from sensor_gateway.stereo.recorded import CameraRecording  # brings OpenCV
+
+    stereo = _choose_run(path, name).stereo
+    assert stereo is not None
+    return CameraRecording(stereo, path, identity)
 
 
 def _open_run(path: Path, name: str | None) -> Callable[[], Pieces]:

@@ -1,10 +1,14 @@
 """How height is won: on the level, a slope, stairs or in a lift, from air pressure and steps (METHODS A8).
 
-A hidden Markov model on ticks of half a second. Stairs give a riser at every step (16 to 20 cm, the source's 1 m in
-five steps), slopes less, lifts and escalators height without steps; what pressure does on the level is weather.
+Interacting multiple models (Blom and Bar-Shalom 1988) on ticks of half a second: for each way to go a scalar Kalman
+filter of the height. Stairs give a riser at every step (16 to 20 cm, the source's 1 m in five steps), slopes less,
+lifts and escalators height without steps; what pressure does on the level is weather, and a draught passes. What
+came later tells what the way was (fixed-lag smoothing).
 """
 
-from typing import Literal
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -13,66 +17,97 @@ from pdr_engine.body.pieces import FloatArray
 
 Way = Literal["level", "slope", "stairs", "lift"]
 TICK_S = 0.5
-RISER_M, RISER_SPREAD_M = 0.168, 0.022  # Swiss norm 16.25 to 19.6 cm, public stairs 15 to 17; and miscounts
-_STATES: tuple[tuple[Way, int], ...] = (
-    ("level", 0),
-    ("slope", 1),
-    ("slope", -1),
-    ("stairs", 1),
-    ("stairs", -1),
-    ("lift", 1),
-    ("lift", -1),
+RISER_M = 0.168  # Swiss norm 16.25 to 19.6 cm, public stairs 15 to 17
+
+
+class _Model(NamedTuple):
+    """``rise_m`` and its sigma: a step where ``walks``, else a tick. ``begin``, ``end``: probability a tick.
+
+    ``noise_m``: of pressure, beside the barometer's own.
+    """
+
+    way: Way
+    rise_m: float
+    sigma_m: float
+    walks: bool
+    begin: float
+    end: float
+    noise_m: float = 0.0
+
+
+_LEVEL_SIGMA_M = 0.018  # a tick: what weather does in seconds
+_UPWARD = (
+    _Model("slope", 0.065, 0.030, True, 0.003, 0.02),  # of 5 to 14 %; who climbs less is on the level
+    _Model("stairs", RISER_M, 0.022, True, 0.008, 0.03),  # sigma: risers, and miscounts
+    _Model("stairs", 0.5 * RISER_M, 0.06, True, 0.008, 0.3),  # begin, end or landing within the tick
+    _Model("lift", 0.55, 0.4, False, 0.006, 0.04),  # 0.2 to 3 m/s
 )
-_LEVEL_M_S = 0.035  # what weather does in a few seconds
-_DRAUGHT_SHARE, _DRAUGHT_M_S = 0.1, 0.1
-_SLOPE_M, _SLOPE_SPREAD_M = (
-    0.065,
-    0.03,
-)  # of rise a step: slopes of 5 to 14 %; who climbs less is on the level
-_LANDING_SHARE = 0.15  # of the time on stairs with a landing or an end in the window
-_LIFT_SLOWEST_M_S, _LIFT_FASTEST_M_S = 0.2, 3.0
-_WALKING_HZ = 0.6
-_LIFT_WALKING = 0.02  # who walks is hardly in a lift
-_ANYTHING = 1e-4  # the likelihood of what nobody thought of
-_BEGIN: dict[Way, float] = {"slope": 0.003, "stairs": 0.012, "lift": 0.006}  # each way, a tick
-_END: dict[Way, float] = {"slope": 0.02, "stairs": 0.03, "lift": 0.04}
+_MODELS = (
+    _Model("level", 0.0, _LEVEL_SIGMA_M, False, 0.0, 0.0),
+    _Model("level", 0.0, _LEVEL_SIGMA_M, False, 0.01, 0.5, noise_m=0.5),  # doors and gusts
+    *_UPWARD,
+    *(model._replace(rise_m=-model.rise_m) for model in _UPWARD),
+)
+_SLOPE, _STAIRS, _EDGE = 0, 1, 2  # in `_UPWARD`
+_FIRST, _SIDES = 2, len(_UPWARD)  # of the models upward, and how many each way
 _BEGIN_LATE = 0.03  # the first steps of stairs look like a slope
+_EDGE_TO_STAIRS, _STAIRS_TO_EDGE = 0.5, 0.06
 _OTHER = 0.0003  # from any way to any other without the level between
+_WALKING_HZ = 0.6
+_STANDING_WHERE_WALKED, _WALKING_IN_LIFT = 1e-4, 0.02
+_ANYTHING = 1e-4  # the likelihood of what nobody thought of
 
 
 def _changes() -> FloatArray:
-    """Probabilities (7, 7) from row to column in a tick."""
-    matrix = np.full((len(_STATES), len(_STATES)), _OTHER)
-    for row, (way, _) in enumerate(_STATES[1:], start=1):
-        matrix[0, row], matrix[row, 0] = _BEGIN[way], _END[way]
-    for sign in (1, -1):
-        matrix[_STATES.index(("slope", sign)), _STATES.index(("stairs", sign))] = _BEGIN_LATE
+    """Probabilities (m, m) from row to column in a tick."""
+    matrix = np.full((len(_MODELS), len(_MODELS)), _OTHER)
+    for row, model in enumerate(_MODELS[1:], start=1):
+        matrix[0, row], matrix[row, 0] = model.begin, model.end
+    for first in (_FIRST, _FIRST + _SIDES):
+        slope, stairs, edge = first + _SLOPE, first + _STAIRS, first + _EDGE
+        matrix[slope, stairs] = _BEGIN_LATE
+        matrix[edge, stairs], matrix[stairs, edge] = _EDGE_TO_STAIRS, _STAIRS_TO_EDGE
     np.fill_diagonal(matrix, 0.0)
     np.fill_diagonal(matrix, 1.0 - matrix.sum(axis=1))
     return matrix
 
 
 _CHANGES = _changes()
+_RISE_M, _SIGMA_M, _NOISE_M = (
+    np.array([getattr(model, name) for model in _MODELS]) for name in ("rise_m", "sigma_m", "noise_m")
+)
+_WALKS = np.array([model.walks for model in _MODELS])
+_IS_LIFT = np.array([model.way == "lift" for model in _MODELS])
+_SIGN = np.sign(_RISE_M)
+_WAYS: tuple[Way, ...] = ("level", "slope", "stairs", "lift")
+_OF_WAY = np.array([[float(model.way == way) for model in _MODELS] for way in _WAYS])
 
 
-class ClimbFilter:
-    """Which way it is, tick by tick."""
+class Tick(NamedTuple):
+    """Mean height by pressure over a tick (None without a sample), its sigma, and steps a second."""
 
-    def __init__(self) -> None:
-        self._shares = _CHANGES[0].copy()
+    height_m: float | None
+    sigma_m: float
+    cadence_hz: float
 
-    def update(self, climb_m_s: float, sigma_m_s: float, cadence_hz: float) -> None:
-        """Take a tick in: the rate of climb around it with its sigma, and steps a second."""
-        posterior = (self._shares @ _CHANGES) * _likelihood(climb_m_s, sigma_m_s, cadence_hz)
-        self._shares = posterior / posterior.sum()
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """Shares (m,) of the models, and of each the height and its variance."""
+
+    shares: FloatArray
+    height_m: FloatArray
+    variance_m2: FloatArray
+
+    @staticmethod
+    def at(height_m: float, sigma_m: float) -> "Belief":
+        """On the level, at this height."""
+        return Belief(_CHANGES[0].copy(), np.full(len(_MODELS), height_m), np.full(len(_MODELS), sigma_m**2))
 
     @property
     def probability(self) -> dict[Way, float]:
         """Of each way, up and down together."""
-        shares: dict[Way, float] = {"level": 0.0, "slope": 0.0, "stairs": 0.0, "lift": 0.0}
-        for (way, _), share in zip(_STATES, self._shares.tolist(), strict=True):
-            shares[way] += share
-        return shares
+        return dict(zip(_WAYS, (_OF_WAY @ self.shares).tolist(), strict=True))
 
     @property
     def way(self) -> Way:
@@ -83,7 +118,7 @@ class ClimbFilter:
     @property
     def up(self) -> bool:
         """Whether it goes up rather than down."""
-        return float(self._shares @ np.array([sign for _, sign in _STATES])) > 0.0
+        return float(self.shares @ _SIGN) > 0.0
 
     @property
     def climb(self) -> Climb:
@@ -91,37 +126,38 @@ class ClimbFilter:
         return Climb(self.probability["stairs"], self.up)
 
 
-def _likelihood(climb_m_s: float, sigma_m_s: float, cadence_hz: float) -> FloatArray:
-    """Of a rate of climb in each state (7,), at this cadence; densities over m/s."""
-    level = (1.0 - _DRAUGHT_SHARE) * _gauss(climb_m_s, np.hypot(_LEVEL_M_S, sigma_m_s))
-    level += _DRAUGHT_SHARE * _gauss(climb_m_s, _DRAUGHT_M_S)
-    densities = [level]
-    for way, sign in _STATES[1:]:
-        densities.append(_climbing(way, sign * climb_m_s, sigma_m_s, cadence_hz))
-    return np.array(densities) + _ANYTHING
+def advance(belief: Belief, tick: Tick) -> tuple[Belief, FloatArray]:
+    """The belief a tick later, and the likelihood (m,) of what the tick showed under each model."""
+    ahead = belief.shares @ _CHANGES
+    mixing = _CHANGES * belief.shares[:, None] / ahead
+    height = belief.height_m @ mixing
+    spread = belief.variance_m2[:, None] + (belief.height_m[:, None] - height) ** 2
+    steps = np.where(_WALKS, max(tick.cadence_hz, _WALKING_HZ) * TICK_S, 1.0)
+    height = height + steps * _RISE_M
+    variance = (mixing * spread).sum(axis=0) + (steps * _SIGMA_M) ** 2
+    likelihood = _by_walking(tick.cadence_hz > _WALKING_HZ)
+    if tick.height_m is not None:
+        total = variance + tick.sigma_m**2 + _NOISE_M**2
+        miss = tick.height_m - height
+        likelihood = likelihood * np.exp(-0.5 * miss**2 / total) / np.sqrt(2.0 * np.pi * total) + _ANYTHING
+        gain = variance / total
+        height, variance = height + gain * miss, (1.0 - gain) * variance
+    shares = ahead * likelihood
+    return Belief(shares / shares.sum(), height, variance), likelihood
 
 
-def _climbing(way: Way, climb_m_s: float, sigma_m_s: float, cadence_hz: float) -> float:
-    """Density of a rate of climb on a way that rises."""
-    walking = cadence_hz > _WALKING_HZ
-    if way == "lift":
-        return _lift(climb_m_s, sigma_m_s) * (_LIFT_WALKING if walking else 1.0)
-    if not walking:
-        return 0.0
-    if way == "stairs":
-        full = RISER_M * cadence_hz
-        partly = float(0.0 < climb_m_s < full) / full
-        whole = _gauss(climb_m_s - full, np.hypot(RISER_SPREAD_M * cadence_hz, sigma_m_s))
-        return (1.0 - _LANDING_SHARE) * whole + _LANDING_SHARE * partly
-    return _gauss(climb_m_s - _SLOPE_M * cadence_hz, np.hypot(_SLOPE_SPREAD_M * cadence_hz, sigma_m_s))
+def _by_walking(walking: bool) -> FloatArray:
+    """Nobody climbs stairs without steps; who walks is hardly in a lift."""
+    if walking:
+        return np.where(_IS_LIFT, _WALKING_IN_LIFT, 1.0)
+    return np.where(_WALKS, _STANDING_WHERE_WALKED, 1.0)
 
 
-def _lift(climb_m_s: float, sigma_m_s: float) -> float:
-    """Even between a slow and a fast lift's speed, and falling off beyond."""
-    missing = max(_LIFT_SLOWEST_M_S - climb_m_s, climb_m_s - _LIFT_FASTEST_M_S, 0.0)
-    even = 1.0 / (_LIFT_FASTEST_M_S - _LIFT_SLOWEST_M_S)
-    return float(even * np.exp(-0.5 * (missing / np.hypot(sigma_m_s, 0.05)) ** 2))
-
-
-def _gauss(miss: float, sigma: float) -> float:
-    return float(np.exp(-0.5 * (miss / sigma) ** 2) / (np.sqrt(2.0 * np.pi) * sigma))
+def smoothed(belief: Belief, likelihoods: Sequence[FloatArray]) -> Belief:
+    """The belief as it is seen after the ticks that followed, of these likelihoods."""
+    told = np.ones(len(_MODELS))
+    for likelihood in reversed(likelihoods):
+        told = _CHANGES @ (likelihood * told)
+        told /= told.sum()
+    shares = belief.shares * told
+    return Belief(shares / shares.sum(), belief.height_m, belief.variance_m2)

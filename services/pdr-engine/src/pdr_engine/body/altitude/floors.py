@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from bootprint.messages import TimeNs
 
 STAY_S = 7.0
-STOREY_M, STOREY_SIGMA_M = 3.6, 0.9
 _MOST_FLOORS_AWAY = 12
 _LOWEST_STOREY_M = 2.2
 _UNEVEN_M = 0.7  # by which storeys of one building differ: ground floors are high
 _SAME_SIGMA_M = 0.4  # of two stays on one floor: thresholds, and what the altimeter missed
 _LANDING_DENSITY = 0.02  # a m: somebody waits between floors
+_ON_A_FLOOR = 0.5  # the least probability of being on any
 _RARE = 0.6  # how much rarer each further unvisited floor is
 _NS_PER_S = 1_000_000_000
 
@@ -36,9 +36,7 @@ class FloorCounter:
     counted by the usual height.
     """
 
-    def __init__(
-        self, start_floor: int = 0, storey_m: float = STOREY_M, storey_sigma_m: float = STOREY_SIGMA_M
-    ) -> None:
+    def __init__(self, start_floor: int, storey_m: float, storey_sigma_m: float) -> None:
         self.floor = start_floor
         self.probability = 1.0
         self.storey_m = storey_m
@@ -59,6 +57,14 @@ class FloorCounter:
             return
         self._counted = True
         self._stay(height_m)
+
+    def at(self, height_m: float) -> tuple[int, float]:
+        """The floor at this height and its probability: that of the last stay where no floor is near."""
+        shares = self.probabilities(height_m)
+        best = max(shares, key=lambda floor: shares[floor], default=self.floor)
+        if sum(shares.values()) < _ON_A_FLOOR:
+            best = self.floor
+        return best, shares.get(best, 0.0)
 
     def moved(self, shift_m: float) -> None:
         """Heights were corrected by this much from outside: floors keep their place."""
@@ -91,7 +97,7 @@ class FloorCounter:
     def _stay(self, height_m: float) -> None:
         shares = self.probabilities(height_m)
         best = max(shares, key=lambda floor: shares[floor])
-        if sum(shares.values()) < 0.5:
+        if sum(shares.values()) < _ON_A_FLOOR:
             return  # between floors: the one before stands
         self.floor, self.probability = best, shares[best]
         known = self._visited.get(best)

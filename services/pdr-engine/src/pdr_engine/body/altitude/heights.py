@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 from pdr_engine.body.altitude.altimeter import LAG_S, Altimeter
 from pdr_engine.body.altitude.floors import FloorCounter
+from pdr_engine.body.altitude.vertical import VerticalChannel
 from pdr_engine.body.movement.classes import Climb
+from pdr_engine.body.settings import AltitudeSettings
 
 _NS_PER_S = 1_000_000_000
 _FRESH_NS = 5 * _NS_PER_S  # of pressure: without it for longer nobody knows how high it is
@@ -32,19 +34,25 @@ class Height:
 class Heights:
     """Pressure and steps in, heights out; nothing is known, and no filter made, before the first pressure."""
 
-    def __init__(self, start_floor: int = 0) -> None:
+    def __init__(self, settings: AltitudeSettings) -> None:
         self._altimeter: Altimeter | None = None
-        self._floors = FloorCounter(start_floor)
+        self._floors = FloorCounter(settings.start_floor, settings.storey_m, settings.storey_sigma_m)
+        self._channel = VerticalChannel()
         self._newest_ns = 0
+
+    def accelerate(self, time_ns: int, force_m_s2: float) -> None:
+        """The vertical specific force since the last call."""
+        if self._altimeter is not None:
+            self._channel.accelerate(time_ns, force_m_s2)
 
     def pressure(self, time_ns: int, pressure_pa: float) -> None:
         """Take a sample in."""
         if self._altimeter is None:
             self._altimeter = Altimeter()
         altimeter = self._altimeter
-        altimeter.pressure(time_ns, pressure_pa)
+        altimeter.pressure(time_ns, pressure_pa, self._channel)
         self._newest_ns = max(self._newest_ns, time_ns)
-        level = altimeter.climbing.way == "level"
+        level = altimeter.settled_way == "level"
         lagged_ns = time_ns - round(LAG_S * _NS_PER_S)
         self._floors.update(lagged_ns, altimeter.settled_height_m, altimeter.sigma_m, level)
 
@@ -66,11 +74,13 @@ class Heights:
         if altimeter is None or time_ns - self._newest_ns > _FRESH_NS:
             return None
         altimeter.step(time_ns)
+        height_m = altimeter.height_m
+        floor, probability = self._floors.at(height_m)
         return Height(
-            height_m=altimeter.height_m,
+            height_m=height_m,
             sigma_m=altimeter.sigma_m,
-            floor=self._floors.floor,
-            floor_probability=self._floors.probability,
-            climb=altimeter.climb,
+            floor=floor,
+            floor_probability=probability,
+            climb=altimeter.climb(self._channel.height_m),
             rate_m_s=altimeter.slope_rate_m_s,
         )

@@ -88,6 +88,11 @@ class PlainBridge:
         self._start_variance = self.sigma_rad**2 + sigma_rad**2
         self.since_s, self._samples = 0.0, 0
 
+    def unbias(self, rate_rad_s: float) -> None:
+        """See `heading.Source`; the interval so far told of the bias before, so another begins."""
+        self.bias_rad_s += rate_rad_s
+        self.lose(0.0)
+
     def _take(self, found: float, variance: float, azimuth_rad: float, sigma_rad: float) -> None:
         self.bias_rad_s += found
         self.bias_variance = variance
@@ -159,6 +164,10 @@ class KalmanBridge:
         """Of the azimuth."""
         self._filter.P[0, 0] += sigma_rad**2
 
+    def unbias(self, rate_rad_s: float) -> None:
+        """See `heading.Source`."""
+        self._filter.x[2] += rate_rad_s
+
 
 BRIDGES: dict[str, type[PlainBridge] | type[KalmanBridge]] = {
     "kalman": KalmanBridge,
@@ -193,6 +202,11 @@ class Bridged:
         """See `heading.Source`."""
         if self._bridge is not None:
             self._bridge.lose(sigma_rad)
+
+    def unbias(self, rate_rad_s: float) -> None:
+        """See `heading.Source`."""
+        if self._bridge is not None:
+            self._bridge.unbias(rate_rad_s)
 
     def _takes(self, reading: Reading, turn_rad: float, step_s: float) -> bool:
         if abs(turn_rad) > QUICK_TURN_RAD_S * step_s:

@@ -52,8 +52,10 @@ class Cascade:
         self._filter.predict()
         if reading is not None:
             self._readings.append(reading.azimuth_rad)
-            self._smooth(reading.sigma_rad)
+            self._smooth()
         azimuth, variance = float(self._filter.x[0, 0]), float(self._filter.P[0, 0])
+        if reading is not None:
+            variance += reading.sigma_rad**2  # iron bends neighbours alike: no filter takes that out
         return Heading(azimuth % math.tau, min(UNKNOWN_RAD, math.sqrt(variance)))
 
     def lose(self, sigma_rad: float) -> None:
@@ -61,11 +63,17 @@ class Cascade:
         self._readings.clear()
         self._filter.P[0, 0] += sigma_rad**2
 
-    def _smooth(self, sigma_rad: float) -> None:
-        """Filter with the longest odd window there is, and let the Kalman filter have its end."""
+    def unbias(self, rate_rad_s: float) -> None:
+        """See `azimuth.Source`: no gyro here."""
+
+    def _smooth(self) -> None:
+        """Filter with the longest odd window there is, and let the Kalman filter have its end.
+
+        It weighs the scatter of readings: to a low-pass one that iron bends is no less sure than its neighbours.
+        """
         count = len(self._readings) - (1 - len(self._readings) % 2)
         window = np.array(self._readings)[-count:]
         predicted = float(self._filter.x[0, 0])
         found = predicted + wrapped(savitzky_golay(window, count - 1) - predicted)
-        self._filter.update(np.array([[found]]), R=np.array([[sigma_rad**2]]))
+        self._filter.update(np.array([[found]]), R=np.array([[self._settings.compass_sigma_rad**2]]))
         self.refined = savitzky_golay(window, DELAY) % math.tau if count == WINDOW else None

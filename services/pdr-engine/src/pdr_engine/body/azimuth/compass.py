@@ -25,13 +25,15 @@ _UNKNOWN = (math.nan, math.nan, math.nan)
 class Reading:
     """Azimuth of the reference axis, clockwise from magnetic north, and its sigma.
 
-    ``trusted``: worth using at all; ``disturbed``: iron or currents are likelier than not.
+    ``trusted``: worth using at all; ``disturbed``: iron or currents are likelier than not. Errors last
+    for steps: ``lasting_variance`` is what each step would have if all were independent and averaged as slowly.
     """
 
     azimuth_rad: float
     sigma_rad: float
     trusted: bool = True
     disturbed: bool = False
+    lasting_variance: float = UNKNOWN_RAD**2
 
 
 def tilt_compensated(field_ut: Vector, pitch_rad: float, roll_rad: float) -> float:
@@ -99,13 +101,14 @@ class Compass:
     def __init__(self, settings: BodySettings) -> None:
         self._calibration = settings.calibration
         heading = settings.heading
+        self._heading = heading
         self._sigma_rad = math.hypot(heading.compass_sigma_rad, heading.disturbance_floor)
         self._two_axis = TwoAxisField() if settings.azimuth == "two-axis" else None
-        self._detector = DisturbanceDetector()
+        self._detector = DisturbanceDetector(None, heading.disturbance_floor)
 
     def know_earth_field(self, field: EarthField) -> None:
         """What the field should be here."""
-        self._detector = DisturbanceDetector(field)
+        self._detector = DisturbanceDetector(field, self._heading.disturbance_floor)
         if self._two_axis is not None:
             self._two_axis.know_earth_field(field)
 
@@ -127,4 +130,16 @@ class Compass:
         verdict = self._detector.update(field, turn_rad, step_s, carried)
         sigma = verdict.sigma_rad(self._sigma_rad)
         azimuth = field.azimuth_rad % math.tau
-        return Reading(azimuth, sigma or UNKNOWN_RAD, sigma is not None, verdict.disturbed)
+        if sigma is None:
+            return Reading(azimuth, UNKNOWN_RAD, trusted=False, disturbed=verdict.disturbed)
+        lasting = self._lasting_variance() * (sigma / self._sigma_rad) ** 2
+        return Reading(azimuth, sigma, disturbed=verdict.disturbed, lasting_variance=lasting)
+
+    def _lasting_variance(self) -> float:
+        """Of an undisturbed reading: tilt and sway last for some steps, iron for as long as a place is like this.
+
+        How much iron there is shows in how uneven the field lately was; never more than buildings have.
+        """
+        heading = self._heading
+        uneven = min(self._detector.unevenness, heading.disturbance_floor)
+        return heading.sway_steps * heading.compass_sigma_rad**2 + heading.correlation_steps * uneven**2

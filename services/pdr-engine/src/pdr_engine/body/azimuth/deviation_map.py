@@ -6,36 +6,26 @@ far as it has been seen to be steady.
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
 
+from pdr_engine.body.azimuth.deviation import Deviation
 from pdr_engine.body.pieces import FloatArray
 
 CELL_M = 4.0
-_PRIOR_SIGMA_RAD = math.radians(6.0)  # deviations nobody has seen
+PRIOR_SIGMA_RAD = math.radians(6.0)  # deviations nobody has seen
 _STEP_SIGMA_RAD = math.radians(10.0)  # of one step's
 
 
-class Cell(NamedTuple):
-    """East and north number of a cell, sums of sine and cosine of its deviations, and of how many ``steps``."""
-
-    east: int
-    north: int
-    sine: float
-    cosine: float
-    steps: int
-
-
 class DeviationMap:
-    """Deviations seen, `Cell` by `Cell`; what `cells` gives makes the same map again."""
+    """Deviations seen, `Deviation` by `Deviation`; what `cells` gives makes the same map again."""
 
-    def __init__(self, cells: Iterable[Cell] = ()) -> None:
+    def __init__(self, cells: Iterable[Deviation] = ()) -> None:
         self._cells = {(cell.east, cell.north): cell for cell in cells}
 
     def learn(self, place_m: FloatArray, compass_rad: float, better_rad: float) -> None:
         """A step at a place (2,) east, north: the compass's azimuth and a better one."""
         east, north = _key(place_m)
         deviation = compass_rad - better_rad
-        known = self._cells.get((east, north), Cell(east, north, 0.0, 0.0, 0))
+        known = self._cells.get((east, north), Deviation(east, north, 0.0, 0.0, 0))
         self._cells[east, north] = known._replace(
             sine=known.sine + math.sin(deviation),
             cosine=known.cosine + math.cos(deviation),
@@ -49,12 +39,12 @@ class DeviationMap:
         """
         known = self._cells.get(_key(place_m))
         if known is None:
-            return 0.0, _PRIOR_SIGMA_RAD
+            return 0.0, PRIOR_SIGMA_RAD
         variance = _STEP_SIGMA_RAD**2 / known.steps
-        share = _PRIOR_SIGMA_RAD**2 / (_PRIOR_SIGMA_RAD**2 + variance)
+        share = PRIOR_SIGMA_RAD**2 / (PRIOR_SIGMA_RAD**2 + variance)
         return share * math.atan2(known.sine, known.cosine), math.sqrt(share * variance)
 
-    def cells(self) -> list[Cell]:
+    def cells(self) -> list[Deviation]:
         """All there is, in order."""
         return [self._cells[key] for key in sorted(self._cells)]
 

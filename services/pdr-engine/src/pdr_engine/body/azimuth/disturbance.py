@@ -23,6 +23,9 @@ _LEAST_PROBABILITY = 1e-4
 _DOUBT, _WORTHLESS_RAD = 4.0, math.radians(90.0)
 _CALIBRATED_UT, _CALIBRATED_RAD = 3.0, math.radians(5.0)  # what a compass's own iron leaves, or a first step
 _CORRELATED_STEPS = 6.0  # that tell the same about the habit
+# Unevenness: of so many steps; it begins as if this many had shown what is told beforehand.
+_MEMORY_STEPS, _FIRST_STEPS = 100.0, 10.0
+_MOST_UNEVENNESS, _LEAST_STRENGTH_UT = 0.5, 1.0
 _LEAST_LEARNING, _HABIT_SHARE = 0.05, 0.3
 
 
@@ -120,15 +123,19 @@ class Habit:
 
 
 class DisturbanceDetector:
-    """Judges the field step by step. ``earth``: the model's field; without it the walk's own is all there is."""
+    """Judges the field step by step. ``earth``: the model's field; without it the walk's own is all there is.
 
-    def __init__(self, earth: EarthField | None = None) -> None:
+    ``unevenness``: what is expected of it to begin with.
+    """
+
+    def __init__(self, earth: EarthField | None = None, unevenness: float = 0.0) -> None:
         self.probability = 0.3
         self._strength = Habit(
             None if earth is None else earth.strength_ut, _CALIBRATED_UT, STRENGTH_UT.clean
         )
         self._dip = Habit(None if earth is None else earth.dip_rad, _CALIBRATED_RAD, DIP_RAD.clean)
         self._recent: deque[Field] = deque(maxlen=STEADY_STEPS)
+        self._uneven, self._uneven_steps = unevenness**2, _FIRST_STEPS
 
     def update(
         self,
@@ -149,9 +156,27 @@ class DisturbanceDetector:
             evidence["azimuth"] = AZIMUTH_RAD.evidence(apart, gyro_azimuth[1])
         self._recent.append(field)
         self._judge(min(max(sum(evidence.values()), -_MOST_EVIDENCE), _MOST_EVIDENCE))
+        self._learn_unevenness(field)
         self._strength.learn(field.strength_ut, 1.0 - self.probability)
         self._dip.learn(field.dip_rad, 1.0 - self.probability)
         return Verdict(self.probability, evidence)
+
+    def _learn_unevenness(self, field: Field) -> None:
+        """Before the habits take this field in: what it is off them."""
+        if self._strength.mean is None or self._dip.mean is None:
+            return
+        strength = (field.strength_ut - self._strength.mean) / max(self._strength.mean, _LEAST_STRENGTH_UT)
+        off = min(strength**2 + (field.dip_rad - self._dip.mean) ** 2, _MOST_UNEVENNESS**2)
+        self._uneven_steps = min(self._uneven_steps + 1.0, _MEMORY_STEPS)
+        self._uneven += (off - self._uneven) / self._uneven_steps
+
+    @property
+    def unevenness(self) -> float:
+        """RMS of what the field lately was off its habit, as a share of its strength: so much an azimuth errs, rad.
+
+        It begins with what buildings have.
+        """
+        return math.sqrt(self._uneven)
 
     def _strength_rms_ut(self, field: Field) -> float:
         """Deviation of all samples of the last three steps from their mean (A6)."""

@@ -30,6 +30,9 @@ class Source(Protocol):
     def lose(self, sigma_rad: float) -> None:
         """The stream broke: the unit may have turned by this much unseen."""
 
+    def unbias(self, rate_rad_s: float) -> None:
+        """From now on the gyro tells turns (counter-clockwise) that are slower by this bias."""
+
 
 def wrapped(angle_rad: float) -> float:
     """The angle in [−π, π]."""
@@ -63,6 +66,9 @@ class GyroAlone:
         """See `Source`."""
         self._walk_variance += sigma_rad**2
 
+    def unbias(self, rate_rad_s: float) -> None:
+        """See `Source`: this one follows no bias."""
+
 
 class CompassAlone:
     """Each step's own reading, believed whatever it is; between readings the gyro."""
@@ -82,12 +88,16 @@ class CompassAlone:
         """See `Source`."""
         self._gyro.lose(sigma_rad)
 
+    def unbias(self, rate_rad_s: float) -> None:
+        """See `Source`: this one follows no bias."""
+
 
 class Combined:
     """Gyro first, compass where the field is trusted (METHODS B8): a Kalman filter of azimuth and gyro drift.
 
     The errors of a compass are alike over some metres, so each of n steps that share an error is given n times its
-    variance. An innovation beyond three sigmas inflates the reading's variance until it is three.
+    variance (`Reading.lasting_variance`). An innovation beyond three sigmas inflates the reading's variance until
+    it is three.
     """
 
     def __init__(self, settings: HeadingSettings) -> None:
@@ -111,6 +121,10 @@ class Combined:
         """See `Source`."""
         self._p[0] += sigma_rad**2
 
+    def unbias(self, rate_rad_s: float) -> None:
+        """See `Source`."""
+        self._drift_rad_s -= rate_rad_s
+
     def _predict(self, turn_rad: float, step_s: float) -> None:
         assert self._azimuth_rad is not None
         self._azimuth_rad += self._drift_rad_s * step_s - turn_rad
@@ -126,7 +140,7 @@ class Combined:
         assert self._azimuth_rad is not None
         aa, ad, dd = self._p
         innovation = wrapped(reading.azimuth_rad - self._azimuth_rad)
-        variance = self._settings.correlation_steps * reading.sigma_rad**2
+        variance = reading.lasting_variance
         total = max(aa + variance, (innovation / _GATE) ** 2)
         gain_a, gain_d = aa / total, ad / total
         self._azimuth_rad += gain_a * innovation

@@ -36,6 +36,11 @@ class Network:
         inputs = inputs_of(np.array([frequency_hz]), np.array([variance_m2_s4]), np.array([inclination_rad]))
         return USUAL_LENGTH_M * math.exp(float(self.log_length(inputs)[0]))
 
+    def layer(self, frequency_hz: float, variance_m2_s4: float, inclination_rad: float) -> tuple[float, ...]:
+        """The hidden layer's outputs (h,) for one step."""
+        inputs = inputs_of(np.array([frequency_hz]), np.array([variance_m2_s4]), np.array([inclination_rad]))
+        return tuple(np.tanh(with_one(inputs) @ self.hidden.T)[0].tolist())
+
 
 def bounded(log_length: Float64Array) -> Float64Array:
     """The same within ±`MOST_LOG`, smoothly."""

@@ -1,4 +1,6 @@
-"""Weights of `pdr_engine.body.length.network`; made of msindoor20 by `proving_ground.evaluation.train_body`."""
+"""Weights of `pdr_engine.body.length.network`, made by `proving_ground.evaluation.train_body` of recorded walks
+(msindoor20) and simulated slopes.
+"""
 
 import numpy as np
 
@@ -7,11 +9,11 @@ from pdr_engine.body.length.network import Network
 NETWORK = Network(
     hidden=np.array(
         [
-            [0.054236, 0.115803, 0.000000, -0.092071],
-            [0.135411, 0.689818, 0.000000, 0.939739],
-            [0.054225, 0.116046, 0.000000, -0.092783],
-            [-0.565561, -0.098038, -0.000000, 0.478913],
+            [0.030867, 0.170193, -0.689029, -0.300726],
+            [-0.082619, 0.677962, 0.587925, 0.496909],
+            [-0.826672, 0.623476, -0.869173, -0.010560],
+            [-0.686371, -0.048028, 0.054544, 0.412028],
         ]
     ),
-    output=np.array([0.193266, 0.691038, 0.194184, 0.403221, -0.675045]),
+    output=np.array([1.173598, 0.664650, -0.521564, 0.816558, -0.285616]),
 )

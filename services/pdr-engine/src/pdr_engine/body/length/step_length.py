@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from bootprint.messages import Direction, MotionClass
 from pdr_engine.body.length.network_weights import NETWORK
+from pdr_engine.body.length.turns import stride_share
 from pdr_engine.body.settings import LengthSettings, StepLength
 from pdr_engine.body.steps.gait import Gait
 
@@ -17,6 +18,7 @@ REFERENCE_LEG_M = 0.9
 _LEAST_LEFT = 0.2  # of a step in the quickest turn
 _MEMORY_STEPS = 200.0
 _FIRST_EVIDENCE, _FIRST_STEPS = -0.6, 20.0  # a hand until told otherwise: the smaller factor
+_SURE_EVIDENCE, _SURE_STEPS = 0.25, 60.0
 # Midway between hands and trunks as recorded, and how far each is from there.
 _SURGE, _SURGE_SPREAD = 0.54, 0.12
 _SHARPNESS, _SHARPNESS_SPREAD = 1.5, 0.25
@@ -41,6 +43,13 @@ class Placement:
         told = min(1.0, max(-1.0, 0.5 * (surge + strikes)))
         self._steps = min(self._steps + 1.0, _MEMORY_STEPS)
         self._evidence += (told - self._evidence) / self._steps
+
+    @property
+    def on_trunk(self) -> bool:
+        """Whether the unit is known to be fixed to the trunk: told so, or by many steps that leave no doubt."""
+        if self._settings.placement != "auto":
+            return self._settings.placement == "trunk"
+        return self._steps >= _SURE_STEPS and self._evidence > _SURE_EVIDENCE
 
     @property
     def pendulum_factor(self) -> float:
@@ -86,7 +95,7 @@ def blend(gait: Gait, settings: LengthSettings, factor: float, runs: bool) -> fl
 
 
 def network(gait: Gait, settings: LengthSettings, factor: float, runs: bool) -> float:
-    """METHODS C2, on level ground."""
+    """METHODS C2, on level ground; see `StepLengths.on_slope`."""
     return NETWORK.length_m(gait.frequency_hz, gait.variance_m2_s4, 0.0)
 
 
@@ -103,7 +112,7 @@ class StepLengths:
     """The length of step after step of one person."""
 
     def __init__(self, model: StepLength, settings: LengthSettings) -> None:
-        self._model = _MODELS[model]
+        self._name, self._model = model, _MODELS[model]
         self._settings = settings
         self._placement = Placement(settings)
 
@@ -125,15 +134,54 @@ class StepLengths:
             return settings.side_step_m * leg
         return self._walking_length(gait, turn_rate_rad_s, motion == "running")
 
+    def on_slope(self, level_m: float, gait: Gait, slope_rad: float) -> float:
+        """A level step's length along a slope: only the network knows of it (C2's inclination)."""
+        if self._name != "network" or not slope_rad:
+            return level_m
+        steep, level = (
+            NETWORK.length_m(gait.frequency_hz, gait.variance_m2_s4, angle) for angle in (slope_rad, 0.0)
+        )
+        return level_m * steep / level
+
+    def features(self, gait: Gait, slope_rad: float) -> tuple[float, ...]:
+        """What a person's own weights refine: the network's hidden layer; nothing of other models."""
+        if self._name != "network":
+            return ()
+        return NETWORK.layer(gait.frequency_hz, gait.variance_m2_s4, slope_rad)
+
+    def refined(self, known: tuple[float, ...]) -> tuple[float, ...]:
+        """A person's weights for `features`: the known ones if they are as many, else none of them differ yet."""
+        count = len(NETWORK.hidden) if self._name == "network" else 0
+        return known if len(known) == count else (0.0,) * count
+
     def learn(self, gait: Gait) -> None:
         """Take a step forward in, for where the unit is worn."""
         self._placement.learn(gait)
 
+    @property
+    def learned(self) -> float:
+        """The factor in walking lengths that comes from what was learned of where the unit is worn."""
+        share = {"pendulum": 1.0, "blend": self._settings.pendulum_weight}.get(self._name, 0.0)
+        return float((self._placement.pendulum_factor / self._settings.hand_factor) ** share)
+
+    @property
+    def on_trunk(self) -> bool:
+        """See `Placement`."""
+        return self._placement.on_trunk
+
     def _walking_length(self, gait: Gait, turn_rate_rad_s: float, runs: bool) -> float:
         settings = self._settings
-        left = max(_LEAST_LEFT, 1.0 - settings.turn_shortening_s * abs(turn_rate_rad_s))
-        length = self._model(gait, settings, self._placement.pendulum_factor, runs) * left
+        length = self._model(gait, settings, self._placement.pendulum_factor, runs)
+        length *= self._left_by_turn(turn_rate_rad_s)
         return min(max(length, SHORTEST_M), LONGEST_M)
+
+    def _left_by_turn(self, turn_rate_rad_s: float) -> float:
+        """What a turn leaves of a step (METHODS B6): corners take a little, a turn about on the spot most of it."""
+        shortening = self._settings.turn_shortening_s
+        if not shortening:
+            return 1.0
+        evenly = max(_LEAST_LEFT, 1.0 - shortening * abs(turn_rate_rad_s))
+        return min(evenly, stride_share(turn_rate_rad_s, 1.0))
 
 
 def projected(length_m: float, slope_rad: float) -> float:

@@ -60,13 +60,20 @@ def rotated(rows: Rows, vector: Vector) -> Vector:
 
 
 class Attitude:
-    """Follows the device's attitude sample by sample."""
+    """Follows the device's attitude sample by sample.
+
+    ``rest_turn_rad_s``: how much rate of turn about the vertical, counter-clockwise, standing still has taken off
+    the gyro as bias since the start. Who follows the azimuth's drift has so much less of it to expect.
+    """
 
     def __init__(self, settings: AttitudeSettings) -> None:
         self._settings = settings
         self._q: Quaternion | None = None
         self._age_s = 0.0
         self._rest = RestWindow(settings)
+        self.rest_turn_rad_s = 0.0
+        self._up: Vector = (0.0, 0.0, 0.0)
+        self._step_s = 0.0
         self.rows: Rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
     @property
@@ -86,11 +93,11 @@ class Attitude:
             self._q = levelling(sample.accel_m_s2)
         if sample.breaks:
             self._age_s = 0.0
-        self._rest.take(sample)
-        bx, by, bz = self._rest.bias_rad_s
         ux, uy, uz = self.rows[2] if self._age_s > 0.0 else rows_of(self._q)[2]
+        self._take_rest(sample, (ux, uy, uz))
+        bx, by, bz = self._rest.bias_rad_s
         pull = self._pull() / max(math.hypot(ax, ay, az), 1.0)
-        step_s = sample.step_s
+        self._step_s = step_s = sample.step_s
         wx, wy, wz = sample.gyro_rad_s
         ex, ey, ez = ay * uz - az * uy, az * ux - ax * uz, ax * uy - ay * ux
         self._q = turned_by(
@@ -104,12 +111,37 @@ class Attitude:
         self.rows = rows_of(self._q)
         return self.rows
 
+    def _take_rest(self, sample: Sample, up: Vector) -> None:
+        before, seconds = self._rest.bias_rad_s, self._rest.seconds
+        self._rest.take(sample)
+        if self._rest.seconds > seconds:
+            changes = zip(up, self._rest.bias_rad_s, before, strict=True)
+            self.rest_turn_rad_s += sum(axis * (now - then) for axis, now, then in changes)
+
     def _learn_bias(self, ex: float, ey: float, ez: float, share: float) -> None:
-        """What gravity has to pull at all the time is a bias: the integral part, blind about the vertical."""
+        """What gravity has to pull at all the time is a bias: the integral part, blind about the vertical.
+
+        The vertical is the mean one: a trunk that sways in step with its surge would leak pull into the bias about
+        it, and an azimuth's drift would grow for minutes.
+        """
         if self._age_s > self._settings.settling_s:
             gain = self._settings.gravity_bias_share * share * self._settings.gravity_rate_per_s
+            ux, uy, uz = self._follow_up()
+            upward = ex * ux + ey * uy + ez * uz
             bx, by, bz = self._rest.bias_rad_s
-            self._rest.bias_rad_s = (bx - gain * ex, by - gain * ey, bz - gain * ez)
+            self._rest.bias_rad_s = (
+                bx - gain * (ex - upward * ux),
+                by - gain * (ey - upward * uy),
+                bz - gain * (ez - upward * uz),
+            )
+
+    def _follow_up(self) -> Vector:
+        """The mean direction of up in device axes (3,), a unit vector."""
+        share = self._step_s * self._settings.gravity_rate_per_s
+        x, y, z = (mean + share * (up - mean) for mean, up in zip(self._up, self.rows[2], strict=True))
+        size = math.sqrt(x * x + y * y + z * z) or 1.0
+        self._up = (x / size, y / size, z / size)
+        return self._up
 
     def _pull(self) -> float:
         settled = self._age_s > self._settings.settling_s

@@ -3,7 +3,8 @@
 The signal is smoothed without delay of phase by a Hann window of 0.26 s, so a peak is known 0.12 s after it. A step
 is the highest point between two troughs, each lower by the threshold, which follows the usual rise of this person;
 a second peak within half the usual interval belongs to the same step. What begins must be regular: gestures and a
-vehicle's jolts are not, so the first steps of a bout wait for the next two and are then all reported.
+vehicle's jolts are not, so the first steps of a bout wait for the next two and are then all reported. A bout whose
+`rhythm` breaks is none, and the next one has to be even for longer.
 """
 
 import math
@@ -13,12 +14,13 @@ from statistics import median
 
 from pdr_engine.body.settings import StepSettings
 from pdr_engine.body.steps.grid import CELL_NS
+from pdr_engine.body.steps.rhythm import EVEN, Rhythm, unevenness
 
 _TAPS = 13
 _HANN = [0.5 - 0.5 * math.cos(2.0 * math.pi * (i + 1) / (_TAPS + 1)) for i in range(_TAPS)]
 _WEIGHTS = [weight / sum(_HANN) for weight in _HANN]
 _DELAY_NS = (_TAPS // 2) * CELL_NS
-_REMEMBERED = 8
+_REMEMBERED, _FEW = 8, 3
 _NS = 1e-9
 
 
@@ -32,6 +34,8 @@ class Footfalls:
         self._intervals_s: deque[float] = deque(maxlen=_REMEMBERED)
         self._waiting: list[int] = []
         self._last_ns: int | None = None  # of the bout that is going on
+        self._rhythm = Rhythm()
+        self._doubted_steps = 0  # until bouts begin as soon again
         self.refused = 0
         self.restart()
 
@@ -65,7 +69,7 @@ class Footfalls:
             self._end_bout()
 
     def _threshold(self) -> float:
-        usual = median(self._rises) if len(self._rises) > 2 else 0.0
+        usual = median(self._rises) if len(self._rises) >= _FEW else 0.0
         return max(self._settings.smallest_rise_m_s2, self._settings.share_of_usual_rise * usual)
 
     def _zigzag(self, now_ns: int, value: float) -> tuple[int, float] | None:
@@ -90,30 +94,52 @@ class Footfalls:
             self._waiting = [peak_ns]
             return []
         interval_s = (peak_ns - before_ns) * _NS
-        if interval_s < self._refractory_s():
+        if interval_s < self._refractory_s(rise):
             return []
         self._rises.append(rise)
         self._intervals_s.append(interval_s)
         if self._last_ns is not None:
-            start_ns, self._last_ns = self._last_ns, peak_ns
-            return [(start_ns, peak_ns)]
+            return self._go_on(peak_ns, interval_s, rise)
         self._waiting.append(peak_ns)
         return self._begin_bout()
 
-    def _refractory_s(self) -> float:
-        usual = median(self._intervals_s) if len(self._intervals_s) > 2 else 0.0
-        return max(self._settings.shortest_s, self._settings.share_of_usual_interval * usual)
+    def _refractory_s(self, rise: float) -> float:
+        """Within which a peak of this rise is none of its own: what rises little is not run."""
+        settings = self._settings
+        shortest = settings.shortest_s if rise > settings.run_rise_m_s2 else settings.shortest_walk_s
+        if len(self._intervals_s) < _FEW or rise > settings.share_of_usual_rise_soon * median(self._rises):
+            return shortest
+        return max(shortest, settings.share_of_usual_interval * median(self._intervals_s))
+
+    def _go_on(self, peak_ns: int, interval_s: float, rise: float) -> list[tuple[int, int]]:
+        """Another step of the bout, unless it turns out to be no walk: then only many even steps are one."""
+        assert self._last_ns is not None
+        if not self._rhythm.take(interval_s, rise, in_doubt=self._doubted_steps > 0):
+            self._end_bout()
+            self._doubted_steps = self._settings.steps_until_trusted
+            self._waiting = [peak_ns]
+            return []
+        self._doubted_steps = max(0, self._doubted_steps - 1)
+        start_ns, self._last_ns = self._last_ns, peak_ns
+        return [(start_ns, peak_ns)]
 
     def _begin_bout(self) -> list[tuple[int, int]]:
         """Report what waited once enough steps in a row are regular; drop the oldest while they are not."""
-        wanted = self._settings.steps_to_begin
+        settings = self._settings
+        wanted = settings.steps_in_doubt if self._doubted_steps else settings.steps_to_begin
         if len(self._waiting) < wanted:
             return []
         intervals = [(b - a) * _NS for a, b in pairwise(self._waiting)]
-        if max(intervals) > (1.0 + self._settings.irregularity) * min(intervals):
+        if not self._is_regular(intervals):
             self._waiting.pop(0)
             self.refused += 1
             return []
+        self._rhythm.restart(intervals)
         times = [self._waiting[0] - round(median(intervals) / _NS), *self._waiting]
         self._waiting, self._last_ns = [], times[-1]
         return list(pairwise(times))
+
+    def _is_regular(self, intervals_s: list[float]) -> bool:
+        if self._doubted_steps:
+            return unevenness(intervals_s) < EVEN
+        return max(intervals_s) <= (1.0 + self._settings.irregularity) * min(intervals_s)

@@ -1,0 +1,190 @@
+"""Steps of the body-worn unit as a source: beside the boots to learn from them, in their place when these are mute.
+
+A body step has a length and an azimuth. While boots walk, stretches of some metres by boots and by body are laid
+beside each other: that tells the angle at which the unit sits and the person's step length, far better than a belt
+knows them by itself. When no boot has spoken for a moment, the body's steps since then carry the feet along, so
+that nothing jumps; satellites, floors and people go on correcting the same state. While a camera tells the same way
+they do not count. A soldier without boots begins where they are known to be, in the azimuth's own north.
+
+Azimuth and length err alike from step to step. So the covariance that a walk of ``D`` adds is ``σ_l²·DDᵀ`` along
+and ``σ_α²·D⊥D⊥ᵀ`` across, which grows with the way's square; each step adds what it makes that grow. Corrections
+by satellites take the memory of the way with them within ``memory_s``.
+"""
+
+import math
+from collections import Counter, deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from bootprint.clock import NS_PER_S
+from bootprint.geodesy import wrap_angle
+from bootprint.messages import BodyStep, FootStep
+from fusion.boots import Boots
+from fusion.config import BodyConfig
+from fusion.state import Array
+
+_PENDING = 16  # steps that may have been made before silence was noticed
+_QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])  # turns a vector to the left
+
+
+@dataclass(slots=True)
+class Learned:
+    """A number with its variance, learned from readings that each err by ``reading``; it wanders by ``wander``."""
+
+    value: float
+    variance: float
+    reading: float
+    wander: float
+
+    def hear(self, told: float) -> None:
+        """One more reading (a scalar Kalman filter)."""
+        self.variance += self.wander**2
+        gain = self.variance / (self.variance + self.reading**2)
+        self.value += gain * told
+        self.variance *= 1.0 - gain
+
+
+class BodyTrack:
+    """The body's steps of one soldier."""
+
+    def __init__(self, config: BodyConfig, counters: Counter[str]) -> None:
+        self._config = config
+        self._silence_ns = round(config.silence_s * NS_PER_S)
+        self._counters = counters
+        self._turn = Learned(0.0, config.turn_sigma_rad**2, config.turn_reading_rad, config.turn_wander_rad)
+        self._scale = Learned(1.0, config.scale_sigma**2, config.scale_reading, config.scale_wander)
+        self._pending: deque[BodyStep] = deque(maxlen=_PENDING)
+        self._carried: list[tuple[int, Array]] = []  # what was carried since a foot last spoke
+        self._stretch: tuple[Array, Array] | None = None  # where boots were, what the body went since
+        self._way = np.zeros(2)  # since the last absolute place, as far as remembered
+        self._heard_ns: int | None = None
+        self._last_sequence = -1
+
+    # --- what comes in -----------------------------------------------------------------------------------------
+
+    def step(self, boots: Boots, also: list[Boots], step: BodyStep) -> None:
+        """A body step; moves ``boots`` and those ``also`` if no foot speaks."""
+        if step.sequence == self._last_sequence:
+            self._counters["duplicate_steps"] += 1
+            return
+        self._last_sequence = step.sequence
+        self._heard_ns = max(self._heard_ns or step.time_ns, step.time_ns)
+        self._pending.append(step)
+        if not boots.in_enu or boots.reference is None:
+            return
+        if self._boots_speak(boots, step.time_ns):
+            self._learn(boots, step)
+            return
+        self._stretch = None
+        if self._camera_speaks(boots, step.time_ns):
+            self._pending.clear()  # it tells the same way
+            return
+        self._carry_pending(boots, also)
+
+    def _boots_speak(self, boots: Boots, now_ns: int) -> bool:
+        heard_ns = boots.feet_heard_ns
+        return heard_ns is not None and now_ns - heard_ns <= self._silence_ns
+
+    def _camera_speaks(self, boots: Boots, now_ns: int) -> bool:
+        heard_ns = None if boots.stand_in is None else boots.stand_in.heard_ns
+        return heard_ns is not None and now_ns - heard_ns <= self._silence_ns
+
+    def _carry_pending(self, boots: Boots, also: list[Boots]) -> None:
+        stand_in_ns = None if boots.stand_in is None else boots.stand_in.heard_ns
+        since_ns = max(boots.feet_heard_ns or 0, stand_in_ns or 0)
+        for step in self._pending:
+            if step.time_ns > since_ns:
+                by, spread = self._moved(step)
+                for one in (boots, *also):
+                    one.carry(by, spread, step.time_ns)
+                self._carried.append((step.time_ns, by))
+                self._counters["steps_by_body"] += 1
+        self._pending.clear()
+
+    def take_back(self, boots: Boots, also: list[Boots], step: FootStep) -> None:
+        """A foot tells, late, of the time in which the body carried it: its own word counts, not both."""
+        if step.realigned:
+            return  # it does not know the way
+        told = [by for time_ns, by in self._carried if step.start_time_ns < time_ns <= step.time_ns]
+        self._carried = [one for one in self._carried if one[0] > step.time_ns]
+        if told:
+            self._counters["steps_by_body_taken_back"] += len(told)
+            for one in (boots, *also):
+                one.carry(-np.sum(told, axis=0), np.zeros((3, 3)))
+
+    def corrected(self, since_last_s: float) -> None:
+        """Satellites have told a place: the way before it is forgotten little by little."""
+        self._way *= math.exp(-max(0.0, since_last_s) / self._config.memory_s)
+
+    def placed(self) -> None:
+        """A person has told a place."""
+        self._way[:] = 0.0
+
+    # --- a step as a move --------------------------------------------------------------------------------------
+
+    def _moved(self, step: BodyStep) -> tuple[Array, Array]:
+        """By how much it moves the body (3,) m, and the covariance (3, 3) that it adds."""
+        flat = self._flat(step)
+        before, after = self._shared(step, self._way), self._shared(step, self._way + flat)
+        self._way = self._way + flat
+        own = (self._config.own_sigma * step.length_m) ** 2
+        spread = np.zeros((3, 3))
+        spread[:2, :2] = _positive(after - before) + own * np.eye(2)
+        spread[2, 2] = own
+        return np.append(flat, 0.0), spread
+
+    def _flat(self, step: BodyStep) -> Array:
+        yaw = 0.5 * math.pi - step.azimuth_rad + self._turn.value
+        length_m = self._scale.value * step.length_m
+        return length_m * np.array([math.cos(yaw), math.sin(yaw)])
+
+    def _shared(self, step: BodyStep, way: Array) -> Array:
+        """Covariance (2, 2) of a way whose azimuths and lengths err alike."""
+        learned_turn = self._turn.variance < self._config.turn_sigma_rad**2
+        turn = self._turn.variance + self._config.azimuth_sigma_rad**2
+        if not learned_turn:
+            turn = max(turn, step.azimuth_sigma_rad**2)
+        across = _QUARTER @ way
+        return self._scale.variance * np.outer(way, way) + turn * np.outer(across, across)
+
+    # --- learning from boots -----------------------------------------------------------------------------------
+
+    def _learn(self, boots: Boots, step: BodyStep) -> None:
+        """Compare a stretch by boots with the same by body, once it is long and straight."""
+        here = np.array(boots.track_point()[:2])
+        yaw = 0.5 * math.pi - step.azimuth_rad
+        went = step.length_m * np.array([math.cos(yaw), math.sin(yaw)])
+        if self._stretch is None:
+            self._stretch = here, np.zeros(2)
+            return
+        begun, by_body = self._stretch[0], self._stretch[1] + went
+        self._stretch = begun, by_body
+        by_boots = here - begun
+        if float(np.hypot(*by_body)) < self._config.stretch_m:
+            return
+        self._stretch = None
+        ratio = float(np.hypot(*by_boots) / np.hypot(*by_body))
+        if 0.5 < ratio < 2.0:
+            angle = math.atan2(by_boots[1], by_boots[0]) - math.atan2(by_body[1], by_body[0])
+            self._turn.hear(wrap_angle(angle - self._turn.value))
+            self._scale.hear(ratio - self._scale.value)
+
+    # --- what is asked -----------------------------------------------------------------------------------------
+
+    def drives(self, boots: Boots, now_ns: int) -> bool:
+        """Whether the position moves by the body's steps alone."""
+        if self._heard_ns is None or boots.carried_ns is None:
+            return False
+        return (
+            not self._boots_speak(boots, now_ns)
+            and not self._camera_speaks(boots, now_ns)
+            and now_ns - self._heard_ns <= self._config.fresh_s * NS_PER_S
+        )
+
+
+def _positive(matrix: Array) -> Array:
+    """The nearest positive semidefinite matrix: a way back must not make anybody sure."""
+    values, vectors = np.linalg.eigh(matrix)
+    result: Array = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    return result

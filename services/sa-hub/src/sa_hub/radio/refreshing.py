@@ -1,0 +1,64 @@
+"""Telling in full again: for whoever can resolve nothing of a soldier, and does not say so.
+
+The first times soon, since a first frame may be missed, then after ever longer pauses.
+"""
+
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+
+from bootprint.clock import NS_PER_S
+from sa_hub.radio.content import Report
+from sa_hub.radio.ground import FloatArray
+from sa_hub.radio.listeners import LOSSLESS, Listeners
+from sa_hub.radio.wares import Candidates
+
+_WORTH: Final = 5.0
+_PAUSE_S: Final = 12.0
+"""Of which so many, by the loss, are the longest pause."""
+_LIMITS_S: Final = (60.0, 600.0)
+_FIRST_S: Final = (5.0, 1.0)
+_OVERDUE_S: Final = 20.0
+_CHEAP_PAUSE_S: Final = 15.0
+_OLD_NS: Final = 10 * NS_PER_S
+
+
+def longest_pause_s(listeners: Listeners, *, cheap: bool) -> float:
+    """Between two frames in full of a soldier: the longer the less is lost, or if all say what they heard."""
+    if cheap:
+        return _CHEAP_PAUSE_S
+    low, high = _LIMITS_S
+    return high if listeners.all_tell else min(max(_PAUSE_S / max(listeners.loss, LOSSLESS), low), high)
+
+
+class Refreshing:
+    """When, and how often, each soldier was told in full."""
+
+    def __init__(self) -> None:
+        self._full_ns: dict[int, tuple[int, int]] = {}
+
+    def told_in_full(self, reports: Iterable[Report], now_ns: int) -> None:
+        """These were."""
+        for report in reports:
+            _, times = self._full_ns.get(report.number, (now_ns, -1))
+            self._full_ns[report.number] = now_ns, times + 1
+
+    def clear(self) -> None:
+        """Nobody was."""
+        self._full_ns.clear()
+
+    def worth(self, who: Candidates, now_ns: int, longest_s: float, *, cheap: bool) -> FloatArray:
+        """(n,) of telling in full again; of an old report nothing, it will be told when it is newer."""
+        overdue = [
+            self._overdue(number, now_ns, _FIRST_S[cheap], longest_s) * (now_ns - report.time_ns < _OLD_NS)
+            for number, report in zip(who.numbers, who.reports, strict=True)
+        ]
+        return _WORTH * np.array(overdue, dtype=np.float64)
+
+    def _overdue(self, number: int, now_ns: int, first_s: float, longest_s: float) -> float:
+        """How urgently a soldier that was told in full some times is to be so again: 0 within its pause, then 1,
+        and within the next minutes ever more, so that no price keeps a receiver in the dark for long."""
+        last_ns, times = self._full_ns.get(number, (now_ns, 0))
+        late_s = (now_ns - last_ns) / NS_PER_S - min(first_s * 2.0 ** min(times, 16), longest_s)
+        return 1.0 + (late_s / _OVERDUE_S) ** 2 if late_s > 0.0 else 0.0

@@ -1,0 +1,83 @@
+// Building the page's elements: `h` makes one, `dialog` asks for values, `toast` tells of an outcome.
+
+type Child = Node | string | null | undefined | false;
+
+export function h<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  properties: Record<string, unknown> = {},
+  ...children: Child[]
+): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(properties)) {
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value as EventListener);
+    else if (name === "class") element.className = String(value);
+    else if (value !== undefined && value !== null && value !== false) element.setAttribute(name, value === true ? "" : String(value));
+  }
+  element.append(...children.filter((each): each is Node | string => each !== null && each !== undefined && each !== false));
+  return element;
+}
+
+export function at(id: string): HTMLElement {
+  return document.getElementById(id)!;
+}
+
+export interface Field {
+  name: string;
+  label: string;
+  value?: string | number;
+  options?: [value: string, label: string][];
+  kind?: "text" | "number" | "password";
+}
+
+/** Ask for values in a dialog of its own; null if it was left. */
+export function ask(title: string, fields: Field[], button: string, note = ""): Promise<Record<string, string> | null> {
+  return new Promise((resolve) => {
+    const dialog = h("dialog", {});
+    const inputs = fields.map((each) => input(each));
+    const finish = (answer: Record<string, string> | null) => {
+      dialog.close();
+      dialog.remove();
+      resolve(answer);
+    };
+    const sent = (event: Event) => {
+      event.preventDefault();
+      finish(Object.fromEntries(fields.map((each, index) => [each.name, inputs[index]!.value])));
+    };
+    dialog.append(h("form", { onsubmit: sent },
+      h("h2", {}, title),
+      note ? h("p", { class: "note" }, note) : null,
+      ...fields.map((each, index) => h("label", {}, h("span", {}, each.label), inputs[index]!)),
+      h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => finish(null) }, "Cancel"), h("button", { class: "primary" }, button)),
+    ));
+    dialog.addEventListener("cancel", () => finish(null));
+    document.body.append(dialog);
+    dialog.showModal();
+  });
+}
+
+function input(field: Field): HTMLInputElement | HTMLSelectElement {
+  if (field.options) {
+    const select = h("select", { name: field.name }, ...field.options.map(([value, label]) => h("option", { value, selected: value === field.value }, label)));
+    return select;
+  }
+  return h("input", { name: field.name, type: field.kind ?? "text", value: field.value, step: "any", maxlength: 200 });
+}
+
+let toastTimer = 0;
+
+/** Tell of an outcome for a few seconds. */
+export function toast(text: string, bad = false): void {
+  let element = document.getElementById("toast");
+  if (!element) document.body.append((element = h("div", { id: "toast", role: "status" })));
+  element.textContent = text;
+  element.className = bad ? "bad shown" : "shown";
+  clearTimeout(toastTimer);
+  toastTimer = window.setTimeout(() => (element.className = ""), bad ? 7000 : 3500);
+}
+
+/** Replace an element's children only if their text would change: hovering and focus survive. */
+export function replaceIfNew(element: HTMLElement, key: string, children: () => Child[]): void {
+  if (element.dataset.key === key) return;
+  element.dataset.key = key;
+  element.replaceChildren(...children().filter((each): each is Node | string => each !== null && each !== undefined && each !== false));
+}

