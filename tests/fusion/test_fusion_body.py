@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 
 from bootprint.bus import Envelope
-from bootprint.config import Origin
 from bootprint.messages import BodyStep, Position
-from fusion.config import FusionConfig, StartConfig
+from fusion.config import FusionConfig
 from fusion.engine import FusionCore
 from support.foot_walks import (
+    EAST,
+    LEFT,
     NS,
+    ORIGIN,
+    RIGHT,
     T0,
     WHO,
-    SimulatedFoot,
     SimulatedWalk,
     envelope,
     in_time_order,
@@ -24,10 +26,6 @@ from support.foot_walks import (
     straight,
 )
 
-ORIGIN = Origin(latitude_deg=58.4, longitude_deg=15.6, height_m=80.0)
-LEFT = SimulatedFoot("left_foot", mounting_rad=1.0, sideways_m=0.12)
-RIGHT = SimulatedFoot("right_foot", mounting_rad=-2.0, sideways_m=-0.12, phase_s=0.6)
-EAST = StartConfig(east_m=0.0, north_m=0.0, sigma_m=0.2, azimuth_deg=90.0, azimuth_sigma_deg=1.0)
 CONFIG = FusionConfig(gnss_sources=(), start=EAST)
 STEP_S = 0.6
 

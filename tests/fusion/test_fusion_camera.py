@@ -10,23 +10,31 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from bootprint.bus import Envelope
-from bootprint.config import Origin
 from bootprint.messages import CameraMotion, Position, upper_triangle
 from fusion.camera_chain import CameraChain, CameraStep, is_plausible
-from fusion.config import FusionConfig, StartConfig
+from fusion.config import FusionConfig
 from fusion.engine import FusionCore
 from fusion.models import camera as model
 from fusion.tilt import Tilt
 from support.camera_walks import WalkingCamera
-from support.foot_walks import NS, T0, WHO, SimulatedFoot, SimulatedWalk, in_time_order, rectangle, straight
+from support.foot_walks import (
+    EAST,
+    NS,
+    ORIGIN,
+    RIGHT,
+    T0,
+    WHO,
+    SimulatedFoot,
+    SimulatedWalk,
+    in_time_order,
+    rectangle,
+    straight,
+)
 
-ORIGIN = Origin(latitude_deg=58.4, longitude_deg=15.6, height_m=80.0)
-EAST = StartConfig(east_m=0.0, north_m=0.0, sigma_m=0.2, azimuth_deg=90.0, azimuth_sigma_deg=1.0)
 DUAL = FusionConfig(gnss_sources=(), start=EAST)
 SINGLE = FusionConfig(feet=("left_foot",), gnss_sources=(), start=EAST)
 DRIFT = math.radians(1.0) / 60.0
 LEFT = SimulatedFoot("left_foot", mounting_rad=1.0, sideways_m=0.12, drift_rad_s=DRIFT)
-RIGHT = SimulatedFoot("right_foot", mounting_rad=-2.0, sideways_m=-0.12, phase_s=0.6)
 ASKEW = Rotation.from_euler("ZYX", [0.3, 0.15, -0.08])
 small = st.floats(-0.4, 0.4)
 

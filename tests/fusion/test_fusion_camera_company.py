@@ -9,11 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bootprint.bus import Envelope
-from bootprint.config import Origin
 from bootprint.messages import BodyStep, Position
 from fusion.boots import Boots
 from fusion.camera import Camera
-from fusion.config import FusionConfig, StartConfig
+from fusion.config import FusionConfig
 from fusion.engine import FusionCore
 from fusion.memory import objection
 from fusion.shadows import Shadows
@@ -21,10 +20,13 @@ from fusion.smoother import Smoother
 from fusion.state import Layout
 from support.camera_walks import WalkingCamera
 from support.foot_walks import (
+    EAST,
+    LEFT,
     NS,
+    ORIGIN,
+    RIGHT,
     T0,
     WHO,
-    SimulatedFoot,
     SimulatedWalk,
     envelope,
     in_time_order,
@@ -32,11 +34,7 @@ from support.foot_walks import (
     straight,
 )
 
-ORIGIN = Origin(latitude_deg=58.4, longitude_deg=15.6, height_m=80.0)
-EAST = StartConfig(east_m=0.0, north_m=0.0, sigma_m=0.2, azimuth_deg=90.0, azimuth_sigma_deg=1.0)
 DUAL = FusionConfig(gnss_sources=(), start=EAST)
-LEFT = SimulatedFoot("left_foot", mounting_rad=1.0, sideways_m=0.12)
-RIGHT = SimulatedFoot("right_foot", mounting_rad=-2.0, sideways_m=-0.12, phase_s=0.6)
 ASKEW = Rotation.from_euler("ZYX", [0.3, 0.15, -0.08])
 SILENT_S = (20.0, 42.0)  # 30 m
 

@@ -12,16 +12,18 @@ from hypothesis import strategies as st
 
 from bootprint import wire
 from bootprint.bus import Envelope, MemoryBus
-from bootprint.config import Origin
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import Fix, FootPose, FootStep, GnssFix, Message, Position, upper_triangle
 from fusion.config import Coupling, FeetConfig, FusionConfig, SilenceConfig, StartConfig
 from fusion.engine import SUBJECTS, FusionCore
 from support.foot_walks import (
+    EAST,
+    LEFT,
     NS,
+    ORIGIN,
+    RIGHT,
     T0,
     WHO,
-    SimulatedFoot,
     SimulatedWalk,
     envelope,
     in_time_order,
@@ -29,11 +31,7 @@ from support.foot_walks import (
     straight,
 )
 
-ORIGIN = Origin(latitude_deg=58.4, longitude_deg=15.6, height_m=80.0)
 FRAME = LocalFrame(ORIGIN)
-LEFT = SimulatedFoot("left_foot", mounting_rad=1.0, sideways_m=0.12)
-RIGHT = SimulatedFoot("right_foot", mounting_rad=-2.0, sideways_m=-0.12, phase_s=0.6)
-EAST = StartConfig(east_m=0.0, north_m=0.0, sigma_m=0.2, azimuth_deg=90.0, azimuth_sigma_deg=1.0)
 DUAL = FusionConfig(gnss_sources=(), start=EAST)
 SINGLE = FusionConfig(feet=("left_foot",), gnss_sources=(), start=EAST)
 SLOW_DUAL, SLOW_SINGLE = (msgspec.structs.replace(config, rate_hz=1.0) for config in (DUAL, SINGLE))

@@ -14,19 +14,26 @@ from bootprint.bus import Envelope
 from bootprint.config import Origin
 from bootprint.messages import FootStep, Position, upper_triangle
 from fusion.boots import Boots
-from fusion.config import FusionConfig, StartConfig
+from fusion.config import FusionConfig
 from fusion.engine import FusionCore
 from fusion.models import dual_foot
 from fusion.models.dual_foot import Passing
 from fusion.models.shared_errors import shares_of
 from fusion.state import Array, Layout
-from support.foot_walks import NS, T0, WHO, SimulatedFoot, SimulatedWalk, in_time_order, rectangle
+from support.foot_walks import (
+    EAST,
+    LEFT,
+    NS,
+    RIGHT,
+    T0,
+    WHO,
+    SimulatedWalk,
+    in_time_order,
+    rectangle,
+)
 
 LAYOUT = Layout.of(("left_foot", "right_foot"))
 ONE, OTHER = LAYOUT.blocks
-LEFT = SimulatedFoot("left_foot", mounting_rad=1.0, sideways_m=0.12)
-RIGHT = SimulatedFoot("right_foot", mounting_rad=-2.0, sideways_m=-0.12, phase_s=0.6)
-EAST = StartConfig(east_m=0.0, north_m=0.0, sigma_m=0.2, azimuth_deg=90.0, azimuth_sigma_deg=1.0)
 small = st.floats(-2.0, 2.0)
 
 

@@ -14,13 +14,12 @@ from typer.testing import CliRunner
 
 from bootprint.bus import Envelope
 from bootprint.cli import build_app
-from bootprint.config import Origin
 from bootprint.errors import RecordingError
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import Fix, FootStep, upper_triangle
 from bootprint.recording import Recorder, read_envelopes
 from fusion.boots import Boots
-from fusion.config import FeetConfig, FusionConfig, StartConfig
+from fusion.config import FeetConfig, FusionConfig
 from fusion.engine import FusionCore
 from fusion.filter import Measurement, StateFilter
 from fusion.smoother import Moment, Smoother, body_track, smooth
@@ -28,10 +27,13 @@ from fusion.state import Layout
 from fusion.tape import Tape
 from proving_ground.evaluation.smoothed import smoothed_walks
 from support.foot_walks import (
+    EAST,
+    LEFT,
     NS,
+    ORIGIN,
+    RIGHT,
     T0,
     WHO,
-    SimulatedFoot,
     SimulatedWalk,
     envelope,
     in_time_order,
@@ -39,10 +41,6 @@ from support.foot_walks import (
     straight,
 )
 
-LEFT = SimulatedFoot("left_foot", mounting_rad=1.0, sideways_m=0.12)
-RIGHT = SimulatedFoot("right_foot", mounting_rad=-2.0, sideways_m=-0.12, phase_s=0.6)
-EAST = StartConfig(east_m=0.0, north_m=0.0, sigma_m=0.2, azimuth_deg=90.0, azimuth_sigma_deg=1.0)
-ORIGIN = Origin(latitude_deg=58.4, longitude_deg=15.6, height_m=80.0)
 Way = Callable[[float], tuple[float, float, float]]
 FRAME = LocalFrame(ORIGIN)
 

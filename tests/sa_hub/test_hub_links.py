@@ -7,6 +7,7 @@ from contextlib import ExitStack
 import pytest
 
 from bootprint.errors import ConfigError
+from proving_ground.exercises.stage import free_ports
 from sa_hub.radio.links.udp import UdpLink
 from sa_hub.settings import LinkProfile
 from support.hub_squad import START_NS, S, Walk, hub, position
@@ -17,13 +18,6 @@ GROUP = "239.255.77.7"
 
 def profile(name: str = "squad", **options: object) -> LinkProfile:
     return LinkProfile(name=name, rate_bits_per_s=1200, **options)  # type: ignore[arg-type]
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 @pytest.fixture
@@ -54,7 +48,7 @@ def test_a_datagram_reaches_every_peer_unchanged(opened: Make) -> None:
 
 
 def test_a_multicast_group_is_heard_by_all_its_members(opened: Make) -> None:
-    port = free_port()
+    (port,) = free_ports(1, socket.SOCK_DGRAM)
     options = {"bind": f"{GROUP}:{port}", "peers": (f"{GROUP}:{port}",), "interface": "127.0.0.1"}
     one, one_hears = opened(profile(**options))
     _, two_hears = opened(profile(**options))
@@ -65,9 +59,8 @@ def test_a_multicast_group_is_heard_by_all_its_members(opened: Make) -> None:
 
 def test_a_peer_that_is_not_there_does_no_harm(opened: Make) -> None:
     ear, inbox = opened(profile(bind="127.0.0.1:0"))
-    mouth, _ = opened(
-        profile(bind="127.0.0.1:0", peers=(f"127.0.0.1:{free_port()}", f"127.0.0.1:{ear.port}"))
-    )
+    (nobody,) = free_ports(1, socket.SOCK_DGRAM)
+    mouth, _ = opened(profile(bind="127.0.0.1:0", peers=(f"127.0.0.1:{nobody}", f"127.0.0.1:{ear.port}")))
     for index in range(3):
         mouth.send(b"%d" % index)
     assert [inbox.get(timeout=5) for _ in range(3)] == [b"0", b"1", b"2"]

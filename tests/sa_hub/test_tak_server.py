@@ -21,6 +21,7 @@ from bootprint.display import Ages
 from bootprint.foreign import ForeignTrack
 from bootprint.messages import Observation, Track
 from bootprint.service import Context, Options
+from proving_ground.exercises.stage import free_ports
 from sa_hub.tak.event import CotEvent, from_xml, to_xml
 from sa_hub.tak.settings import TakSettings
 from sa_hub.tak.sink import TakSink
@@ -40,17 +41,10 @@ pytestmark = [
 S = 1_000_000_000
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
 @pytest.fixture(params=["tcp", "tls"])
 def server(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
     """taky; its url."""
-    port = free_port()
+    (port,) = free_ports(1, socket.SOCK_STREAM)
     write_certificates(tmp_path)
     (tmp_path / "taky.conf").write_text(
         f"""
@@ -72,8 +66,13 @@ cert_db={tmp_path}/certificates.txt
     command = [sys.executable, "-W", "ignore", "-m", "taky.cot", "-c", str(tmp_path / "taky.conf")]
     with (tmp_path / "taky.log").open("wb") as log:
         process = subprocess.Popen(command, stdout=log, stderr=log)
+
+    def is_up() -> bool:
+        assert process.poll() is None, (tmp_path / "taky.log").read_text()
+        return answers(port)
+
     try:
-        wait_until(lambda: answers(port), timeout_s=60.0, what=(tmp_path / "taky.log").read_text())
+        wait_until(is_up, timeout_s=60.0, what="taky answers")
         yield f"{request.param}://127.0.0.1:{port}"
     finally:
         process.terminate()

@@ -14,12 +14,17 @@ import numpy as np
 import numpy.typing as npt
 
 from bootprint.bus import Envelope
+from bootprint.config import Origin
 from bootprint.messages import FootPose, FootStep, Message, upper_triangle
 from bootprint.topics import Identity
+from fusion.config import StartConfig
 
 NS = 1_000_000_000
 T0 = 1_700_000_000 * NS
 WHO = Identity("bp", "alpha", "a1")
+ORIGIN = Origin(latitude_deg=58.4, longitude_deg=15.6, height_m=80.0)
+EAST = StartConfig(east_m=0.0, north_m=0.0, sigma_m=0.2, azimuth_deg=90.0, azimuth_sigma_deg=1.0)
+"""Where the walks begin, and which way they go."""
 STRIDE_S = 1.2
 SPEED_M_S = 1.4
 FloatArray = npt.NDArray[np.float64]
@@ -48,7 +53,7 @@ def rectangle(width_m: float, depth_m: float) -> Path:
     return at
 
 
-@dataclass
+@dataclass(frozen=True)
 class SimulatedFoot:
     """How one foot reports."""
 
@@ -58,6 +63,10 @@ class SimulatedFoot:
     phase_s: float = 0.0
     drift_rad_s: float = 0.0
     sigmas: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+
+LEFT = SimulatedFoot("left_foot", mounting_rad=1.0, sideways_m=0.12)
+RIGHT = SimulatedFoot("right_foot", mounting_rad=-2.0, sideways_m=-0.12, phase_s=0.6)
 
 
 @dataclass

@@ -77,14 +77,17 @@ class Hub:
                 self.health.append(message)
 
 
+def command(config: Path, *extra: str) -> list[str]:
+    """How a hub is started by itself."""
+    return [sys.executable, "-c", "from sa_hub.main import main; main()", "--config", str(config), *extra]
+
+
 @contextmanager
 def running(config: Path, identity: Identity, within: Sequence[str] = ()) -> Iterator[Hub]:
     """A hub's process, alive; ``within`` stands before its command (``ip netns exec …``)."""
-    code = "from sa_hub.main import main; main()"
     endpoint = f"unixsock-stream/{config.parent / 'router'}"
     with running_router(endpoint) as router:
-        command = [*within, sys.executable, "-c", code, "--config", str(config), "--router", router]
-        process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        process = subprocess.Popen([*within, *command(config, "--router", router)], stderr=subprocess.DEVNULL)
         bus = open_bus(router)
         try:
             hub = Hub(identity, bus, process)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import typer
 from scipy.optimize import least_squares
 
 from bootprint.geomagnetism import EarthField
@@ -329,5 +330,5 @@ def all_rows(data: Path | None, seeds: range = range(1, 12, 2)) -> dict[str, lis
 
 
 if __name__ == "__main__":
-    print(bridging_table())  # noqa: T201
-    print(azimuth_table(all_rows(Path(sys.argv[1]) if len(sys.argv) > 1 else None)))  # noqa: T201
+    typer.echo(bridging_table())
+    typer.echo(azimuth_table(all_rows(Path(sys.argv[1]) if len(sys.argv) > 1 else None)))

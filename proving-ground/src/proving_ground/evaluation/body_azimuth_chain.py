@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import typer
 
 from pdr_engine.body import BodyNavigator, BodySettings, BodyStepEstimate
 from pdr_engine.body.azimuth.deviation import Deviation
@@ -150,4 +151,4 @@ def _wrapped(angle: FloatArray) -> FloatArray:
 
 
 if __name__ == "__main__":
-    print(chain_tables())  # noqa: T201
+    typer.echo(chain_tables())

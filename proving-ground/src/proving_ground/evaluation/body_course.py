@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import typer
 
 from bootprint.geomagnetism import EarthField
 from bootprint.messages import Direction
@@ -151,4 +152,4 @@ def _truth(motion: PersonMotion, stride: Stride) -> set[Direction]:
 
 
 if __name__ == "__main__":
-    print(course_table())  # noqa: T201
+    typer.echo(course_table())

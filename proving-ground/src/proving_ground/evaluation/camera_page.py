@@ -60,7 +60,7 @@ says why, when a verdict speaks against it:
 | `smoke` | light, but no structure |
 | `close_wall` | what both eyes see is nearer than 0.6 m and cannot be followed |
 | `crowd` | of the landmarks that should be in view too few are where they should be |
-| `few_landmarks`, `lost`, `bad_image` | nothing to follow, or no image |
+| `few_landmarks`, `bad_image` | nothing to follow, or no image |
 
 People who fill the view and move alike deceive it: a camera without an inertial unit cannot tell them from a room.
 With one (`imu = "camera"`, the place of a unit beside the camera with axes forward, left, up) an EKF of 15 states

@@ -8,7 +8,7 @@ import numpy as np
 
 from sensor_gateway.stereo.images import Image
 
-Condition = Literal["starting", "dark", "smoke", "close_wall", "crowd", "few_landmarks", "lost", "bad_image"]
+Condition = Literal["starting", "dark", "smoke", "close_wall", "crowd", "few_landmarks", "bad_image"]
 
 _BLACK_GREY = 12.0  # a mean below: the shutter is open in vain
 _AMPLIFIED_GREY, _NOISY = 5.0, 0.45  # noise, and noise against structure: what an amplifier makes of darkness
@@ -79,6 +79,5 @@ WORDS: dict[Condition, str] = {
     "close_wall": "a wall too close",
     "crowd": "most of the view moves by itself",
     "few_landmarks": "too few corners to follow",
-    "lost": "the view has changed altogether",
     "bad_image": "an image that cannot be used",
 }
