@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from bootprint.cli import main
 from bootprint.errors import BootprintError
-from proving_ground.evaluation import benchmark, fresh_engine
+from proving_ground.evaluation import benchmark, fresh_engine, limits
 from proving_ground.evaluation.benchmark import LIMITS, FootFigures, measure_process, one_core, walk_of
 from proving_ground.evaluation.textbook import (
     GRAVITY_M_S2,
@@ -139,7 +139,7 @@ def run_with(monkeypatch: pytest.MonkeyPatch, figures: FootFigures, *arguments: 
 def test_check_fails_on_each_missed_limit(limit: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     worse = limit.bound * (0.99 if limit.at_least else 1.01)
     bad = replace(GOOD, **{limit.figure: worse})
-    assert run_with(monkeypatch, bad, "--check")[0] == benchmark.MISSED
+    assert run_with(monkeypatch, bad, "--check")[0] == limits.MISSED
     assert run_with(monkeypatch, bad)[0] == 0
     code, output = run_with(monkeypatch, GOOD, "--check")
     assert (code, output.count("holds"), output.count("missed")) == (0, len(LIMITS), 0)

@@ -10,10 +10,11 @@ from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.config import Member, Origin, Realm
 from bootprint.geodesy import LocalFrame
-from bootprint.messages import Alert, Position, Track
+from bootprint.messages import Alert, Track
 from bootprint.prediction import moved_m
 from bootprint.topics import Identity
 from proving_ground.exercises.emulated_radio import Air, NetProfile
+from proving_ground.positions import position_at
 from sa_hub.assembly import build_hub
 from sa_hub.hub import STEP_NS, HubCore
 from sa_hub.radio.counters import MemoryCounters
@@ -144,19 +145,9 @@ class Trial:
                 self._keep(name, self.hubs[name].handle(self._position(name, east, north, velocity)))
 
     def _position(self, name: str, east: float, north: float, velocity: tuple[float, float]) -> Envelope:
-        latitude, longitude, height = self._frame.to_geodetic(east, north, 0.0)
-        message = Position(
-            time_ns=self.now_ns,
-            mode="boots",
-            latitude_deg=latitude,
-            longitude_deg=longitude,
-            height_m=height,
-            east_m=east,
-            north_m=north,
-            up_m=0.0,
-            covariance_m2=(1.0, 0.0, 0.0, 1.0, 0.0, 4.0),
-            velocity_m_s=(*velocity, 0.0),
-        )
+        enu_m = east, north, 0.0
+        geodetic = self._frame.to_geodetic(*enu_m)
+        message = position_at(self.now_ns, enu_m, geodetic, (1.0, 1.0, 4.0), velocity_m_s=velocity)
         return Envelope(Identity("bp", "alpha", name).address("position", "fusion"), message)
 
     def _send(self, name: str, hub: HubCore) -> None:

@@ -12,16 +12,17 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
-from bootprint.commands.options import Json, write_json
+from bootprint.commands.options import Json
 from bootprint.errors import BootprintError
 from proving_ground.evaluation.hub_benchmark import hub
-from proving_ground.evaluation.limits import Limit, limits_table
+from proving_ground.evaluation.limits import Limit, conclude, limits_table
 from proving_ground.evaluation.warning_benchmark import warnings
 from proving_ground.radio_budgets import budgets
 from sensor_gateway.recordings.run import FEET, ImuSeries
@@ -29,7 +30,6 @@ from sensor_gateway.recordings.run import FEET, ImuSeries
 if TYPE_CHECKING:
     from pdr_engine.foot import FootNavigator
 
-MISSED = 1  # exit code
 _BATCH = 10
 _RECTANGLE_M = ((0.0, 0.0, 0.0), (30.0, 0.0, 0.0), (30.0, 15.0, 0.0), (0.0, 15.0, 0.0), (0.0, 0.0, 0.0))
 _PATIENCE_S = 120.0  # the first start of all compiles the kernel
@@ -88,12 +88,8 @@ def foot(
     Example: bootprint benchmark foot --check
     """
     figures = measure(walk_of(path), turns)
-    if json is not None:
-        write_json(asdict(figures), json)
-    if json != "-":
-        show(figures)
-    if check and not all(limit.holds(figures) for limit in LIMITS):
-        raise typer.Exit(MISSED)
+    keeps_limits = all(limit.holds(figures) for limit in LIMITS)
+    conclude(asdict(figures), partial(show, figures), keeps_limits=keeps_limits, json=json, check=check)
 
 
 def walk_of(path: Path | None) -> ImuSeries:

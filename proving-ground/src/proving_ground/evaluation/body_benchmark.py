@@ -2,14 +2,16 @@
 
 import time
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
 
-from bootprint.commands.options import Json, write_json
-from proving_ground.evaluation.benchmark import MISSED, one_core
+from bootprint.commands.options import Json
+from proving_ground.evaluation.benchmark import one_core
+from proving_ground.evaluation.limits import conclude
 from sensor_gateway.recordings.run import ImuSeries
 
 RATE_HZ = 100.0
@@ -41,16 +43,16 @@ def body(
     Example: bootprint benchmark body --check
     """
     figures = measure_body(walk_of(path), turns)
-    if json is not None:
-        write_json(asdict(figures), json)
-    if json != "-":
-        verdict = "holds" if figures.core_pct <= MOST_SHARE_PCT else "missed"
-        typer.echo(
-            f"{figures.us_per_sample:.1f} µs a sample over {figures.samples} samples and {figures.steps} steps: "
-            f"{figures.core_pct:.2f} % of a core at 100 Hz (limit {MOST_SHARE_PCT:g} %: {verdict})"
-        )
-    if check and figures.core_pct > MOST_SHARE_PCT:
-        raise typer.Exit(MISSED)
+    keeps_limits = figures.core_pct <= MOST_SHARE_PCT
+    conclude(asdict(figures), partial(_show, figures), keeps_limits=keeps_limits, json=json, check=check)
+
+
+def _show(figures: BodyFigures) -> None:
+    verdict = "holds" if figures.core_pct <= MOST_SHARE_PCT else "missed"
+    typer.echo(
+        f"{figures.us_per_sample:.1f} µs a sample over {figures.samples} samples and {figures.steps} steps: "
+        f"{figures.core_pct:.2f} % of a core at 100 Hz (limit {MOST_SHARE_PCT:g} %: {verdict})"
+    )
 
 
 def walk_of(path: Path | None) -> ImuSeries:

@@ -20,11 +20,11 @@ import typer
 
 from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
-from bootprint.commands.options import Json, write_json
+from bootprint.commands.options import Json
 from bootprint.geodesy import moved_place
 from bootprint.messages import Alert, Health, LinkReport, Track
 from bootprint.topics import Identity
-from proving_ground.evaluation.limits import Limit, limits_table
+from proving_ground.evaluation.limits import Limit, conclude, limits_table
 
 if TYPE_CHECKING:
     from sa_hub.history.archive import Archive
@@ -231,12 +231,8 @@ def history(
     """
     with tempfile.TemporaryDirectory() as folder:
         figures = measure(url or f"sqlite:///{folder}/history.db", soldiers, hours, every)
-    if json is not None:
-        write_json(asdict(figures), json)
-    if json != "-":
-        _show(figures)
-    if check and not all(limit.holds(figures) for limit in LIMITS):
-        raise typer.Exit(1)
+    keeps_limits = all(limit.holds(figures) for limit in LIMITS)
+    conclude(asdict(figures), partial(_show, figures), keeps_limits=keeps_limits, json=json, check=check)
 
 
 def _show(figures: HistoryFigures) -> None:

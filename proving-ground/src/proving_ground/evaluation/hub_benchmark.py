@@ -10,17 +10,18 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
 import typer
 
-from bootprint.commands.options import Json, write_json
+from bootprint.commands.options import Json
 from bootprint.errors import BootprintError
 from proving_ground.evaluation.hub_company import Company, HeardFrame
 from proving_ground.evaluation.hub_work import Work, cot_events, merge, parse_cot
-from proving_ground.evaluation.limits import Limit, limits_table
+from proving_ground.evaluation.limits import Limit, conclude, limits_table
 
 SIZES = (12, 40, 120, 500)
 MERGED = 500
@@ -144,15 +145,9 @@ def hub(
 
     Example: bootprint benchmark hub --check
     """
-    from proving_ground.evaluation.benchmark import MISSED
-
     figures = measure(SIZES, seconds, turns)
-    if json is not None:
-        write_json(asdict(figures), json)
-    if json != "-":
-        show(figures)
-    if check and not all(limit.holds(figures) for limit in LIMITS):
-        raise typer.Exit(MISSED)
+    keeps_limits = all(limit.holds(figures) for limit in LIMITS)
+    conclude(asdict(figures), partial(show, figures), keeps_limits=keeps_limits, json=json, check=check)
 
 
 def show(figures: HubFigures) -> None:

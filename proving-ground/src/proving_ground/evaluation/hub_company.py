@@ -17,6 +17,7 @@ from bootprint.config import Member, Origin, Realm
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import Position
 from bootprint.topics import Address, Identity
+from proving_ground.positions import position_at
 from sa_hub.assembly import build_hub
 from sa_hub.hub import HubCore
 from sa_hub.radio.counters import MemoryCounters
@@ -110,18 +111,13 @@ class Company:
 def position(number: int, time_ns: int) -> Position:
     """What a walker's fusion tells: legs of 17 s, each turned by the golden angle from the one before."""
     east_m, north_m, azimuth_rad = _walk(number, (time_ns - START_NS) / NS_PER_S)
-    latitude_deg, longitude_deg, height_m = LocalFrame(_ORIGIN).to_geodetic(east_m, north_m, 0.0)
-    return Position(
-        time_ns=time_ns,
-        mode="boots",
-        latitude_deg=latitude_deg,
-        longitude_deg=longitude_deg,
-        height_m=height_m,
-        east_m=east_m,
-        north_m=north_m,
-        up_m=0.0,
-        covariance_m2=(1.0, 0.0, 0.0, 1.0, 0.0, 1.0),
-        velocity_m_s=(_PACE_M_S * math.sin(azimuth_rad), _PACE_M_S * math.cos(azimuth_rad), 0.0),
+    enu_m = east_m, north_m, 0.0
+    return position_at(
+        time_ns,
+        enu_m,
+        LocalFrame(_ORIGIN).to_geodetic(*enu_m),
+        (1.0, 1.0, 1.0),
+        velocity_m_s=(_PACE_M_S * math.sin(azimuth_rad), _PACE_M_S * math.cos(azimuth_rad)),
     )
 
 

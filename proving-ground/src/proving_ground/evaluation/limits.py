@@ -1,11 +1,19 @@
-"""Bounds that a benchmark's figures keep, and how they are shown."""
+"""Bounds that a benchmark's figures keep, how they are shown, and how a benchmark ends."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
+
+import typer
+
+from bootprint.commands.options import write_json
 
 if TYPE_CHECKING:
     from rich.table import Table
+
+
+MISSED: Final = 1
+"""Exit code of a benchmark with ``--check`` that misses a limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,3 +50,15 @@ def limits_table(figures: object, limits: Sequence[Limit], subject: str) -> "Tab
         value = f"{getattr(figures, limit.figure):.2f} {limit.unit}"
         table.add_row(value, limit.bounds, verdict, limit.meaning)
     return table
+
+
+def conclude(
+    figures: object, show: Callable[[], None], *, keeps_limits: bool, json: str | None, check: bool
+) -> None:
+    """Tell people and ``--json`` the figures; with ``--check`` exit `MISSED` if a limit is missed."""
+    if json is not None:
+        write_json(figures, json)
+    if json != "-":
+        show()
+    if check and not keeps_limits:
+        raise typer.Exit(MISSED)

@@ -6,13 +6,15 @@ no time. What nobody would be in time for, a line that swings across somebody fo
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Final
 
 import numpy as np
 import typer
 
 from bootprint.awareness import Reason
-from bootprint.commands.options import Json, write_json
+from bootprint.commands.options import Json
+from proving_ground.evaluation.limits import conclude
 from proving_ground.evaluation.warning_play import (
     REASONS,
     STEPS_PER_S,
@@ -121,20 +123,14 @@ def warnings(
 
     Example: bootprint benchmark warnings --bitrate 1200 --loss 0.1
     """
-    from proving_ground.evaluation.benchmark import MISSED
-
     radio = Radio(bitrate, loss, header_bytes)
     rows = [
         row
         for name in scenario or ["building-clearing", "platoon-raid"]
         for row in rows_of(name, play_warnings(squad_walks(name, seed, seconds), radio, seed))
     ]
-    if json is not None:
-        write_json(rows, json)
-    if json != "-":
-        show(rows)
-    if check and any((row.within_5_s_pct or 0.0) < LEAST_WITHIN_PCT for row in rows):
-        raise typer.Exit(MISSED)
+    keeps_limits = not any((row.within_5_s_pct or 0.0) < LEAST_WITHIN_PCT for row in rows)
+    conclude(rows, partial(show, rows), keeps_limits=keeps_limits, json=json, check=check)
 
 
 def show(rows: list[DelayRow]) -> None:

@@ -19,11 +19,12 @@ from bootprint.clock import NS_PER_S, ScaledClock
 from bootprint.config import Member
 from bootprint.display import Ages
 from bootprint.geodesy import LocalFrame
-from bootprint.messages import Fix, Position
+from bootprint.messages import Fix
 from proving_ground.exercises.exercise import Exercise, Fault, Settings, Soldier
 from proving_ground.exercises.exercise_files import hub_settings, write_plan
 from proving_ground.exercises.line import Line
 from proving_ground.exercises.radio_play import RadioPlay
+from proving_ground.positions import position_at
 from proving_ground.radio_load.telling import DELAY_S, INDOORS, PERIOD_S, told
 from sa_hub.page.app import build_app
 from sa_hub.page.audit import Audit
@@ -96,23 +97,15 @@ def _line(exercise: Exercise, soldier: Soldier, seed: int) -> Line:
     frame = LocalFrame(exercise.origin)
     floors = exercise.floors(place_m[:, 2]) if len(exercise.storeys_m) > 1 else None
     line = Line(soldier.id)
-    for index, ((east_m, north_m, up_m), (east_m_s, north_m_s)) in enumerate(
-        zip(place_m.tolist(), velocity_m_s.tolist(), strict=True)
-    ):
+    for index, (enu_m, velocity) in enumerate(zip(place_m.tolist(), velocity_m_s.tolist(), strict=True)):
         time_ns = exercise.begins_ns + round(soldier.truth.time_s[index] * NS_PER_S)
-        latitude_deg, longitude_deg, height_m = frame.to_geodetic(east_m, north_m, up_m)
-        position = Position(
-            time_ns=time_ns,
+        position = position_at(
+            time_ns,
+            enu_m,
+            frame.to_geodetic(*enu_m),
+            (INDOORS.error_m**2, INDOORS.error_m**2, 1.0),
+            velocity_m_s=velocity,
             sequence=index,
-            mode="boots",
-            latitude_deg=latitude_deg,
-            longitude_deg=longitude_deg,
-            height_m=height_m,
-            east_m=east_m,
-            north_m=north_m,
-            up_m=up_m,
-            covariance_m2=(INDOORS.error_m**2, 0.0, 0.0, INDOORS.error_m**2, 0.0, 1.0),
-            velocity_m_s=(east_m_s, north_m_s, 0.0),
             floor=None if floors is None else int(floors[index]),
         )
         line.positions.append((time_ns + round(DELAY_S * NS_PER_S), position))

@@ -11,10 +11,10 @@ import numpy as np
 from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.geodesy import LocalFrame
-from bootprint.messages import Position
 from bootprint.recording import Recorder
 from bootprint.topics import Identity
 from proving_ground.exercises.exercise import Exercise, Soldier
+from proving_ground.positions import position_at
 
 TRUTH_REALM = "truth"
 SOURCE = "truth"
@@ -35,19 +35,14 @@ def truth_positions(exercise: Exercise, soldier: Soldier, start_ns: int) -> Iter
     for sequence, (time_s, place) in enumerate(
         zip(soldier.truth.time_s, np.nan_to_num(soldier.truth.position_m), strict=True)
     ):
-        east, north, up = (float(value) for value in place)
-        latitude, longitude, height = frame.to_geodetic(east, north, up)
-        message = Position(
-            time_ns=start_ns + round(time_s * NS_PER_S),
-            sequence=sequence,
+        enu_m = place.tolist()
+        message = position_at(
+            start_ns + round(time_s * NS_PER_S),
+            enu_m,
+            frame.to_geodetic(*enu_m),
+            (0.0, 0.0, 0.0),
             mode="gnss",
-            latitude_deg=latitude,
-            longitude_deg=longitude,
-            height_m=height,
-            east_m=east,
-            north_m=north,
-            up_m=up,
-            covariance_m2=(0.0,) * 6,
+            sequence=sequence,
             sources=(SOURCE,),
         )
         yield Envelope(address, message)

@@ -16,6 +16,7 @@ from bootprint.config import Member, Realm
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import Position, Track
 from bootprint.topics import Address, Identity
+from proving_ground.positions import position_at
 from proving_ground.radio_load.budget_check import exceeds_budget
 from proving_ground.radio_load.load import BEGINS_NS, NET, ORIGIN, SETTLE_S, Load, Outcome
 from proving_ground.radio_load.picture_error import DAMPED, Errors, Seen
@@ -46,20 +47,13 @@ class _Feed:
 
     def position(self, soldier: int, index: int) -> Position:
         """The fused position of a soldier at a stamp's index."""
-        latitude_deg, longitude_deg, height_m = self._geodetic[soldier][index]
-        east_m, north_m, up_m = self._places[soldier][index]
         east_m_s, north_m_s = self._velocities[soldier][index]
-        return Position(
-            time_ns=BEGINS_NS + index * round(PERIOD_S * NS_PER_S),
-            mode="boots",
-            latitude_deg=latitude_deg,
-            longitude_deg=longitude_deg,
-            height_m=height_m,
-            east_m=east_m,
-            north_m=north_m,
-            up_m=up_m,
-            covariance_m2=(_VARIANCE_M2, 0.0, 0.0, _VARIANCE_M2, 0.0, _VARIANCE_M2),
-            velocity_m_s=(east_m_s, north_m_s, 0.0),
+        return position_at(
+            BEGINS_NS + index * round(PERIOD_S * NS_PER_S),
+            self._places[soldier][index],
+            self._geodetic[soldier][index],
+            (_VARIANCE_M2, _VARIANCE_M2, _VARIANCE_M2),
+            velocity_m_s=(east_m_s, north_m_s),
             speed_m_s=(east_m_s**2 + north_m_s**2) ** 0.5,
         )
 
