@@ -140,10 +140,14 @@ def test_an_alert_stays_until_somebody_acknowledges_it(looking: Tab, squad: Show
 
 def test_an_observation_lies_where_it_was_clicked(looking: Tab, squad: ShownPlay) -> None:
     page = looking.page
-    looking.wait("!squad.map.map.isMoving()")
+    # What lies under the pointer is asked for at the click: a banner that comes or goes moves the map.
+    looking.says(
+        """void squad.map.map.once("click", () =>
+        squad.clicked = squad.map.map.unproject([260, 330]))"""
+    )
     page.keyboard.press("o")
-    place = looking.says("(({lng, lat}) => [lat, lng])(squad.map.map.unproject([260, 330]))")
     page.locator("#map").click(position={"x": 260, "y": 330})
+    place = looking.wait("squad.clicked && [squad.clicked.lat, squad.clicked.lng]")
     page.select_option('dialog [name="code"]', "vehicle")
     page.fill('dialog [name="text"]', "two trucks")
     page.click("dialog .primary")
