@@ -9,7 +9,7 @@ WEB := services/sa-hub/web
 PAGE := services/sa-hub/src/sa_hub/page/static/index.html
 PAGE_SOURCES := $(wildcard $(WEB)/*.json $(WEB)/*.ts $(WEB)/*.html $(WEB)/src/*)
 
-.PHONY: help setup page demo test check format golden figures vectors page-load fuzz compose-test wheels constraints clean
+.PHONY: help setup page demo test check format golden figures vectors page-load kills fuzz compose-test wheels constraints clean
 
 help: ## show what there is to make
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -60,6 +60,8 @@ figures: $(READY) $(PAGE) ## make anew the figures and generated pages of the do
 	$(BIN)/python -m proving_ground.evaluation.fusion_page docs
 	$(BIN)/python -m proving_ground.evaluation.fusion_feet_page $(or $(BOOTPRINT_DATA),../shared/data) docs
 	$(BIN)/python -m proving_ground.evaluation.camera_page docs
+	$(BIN)/python -m proving_ground.exercises.reliability_page docs
+	$(BIN)/python -m proving_ground.evaluation.room_page docs
 	$(BIN)/python -m proving_ground.agreement.report $(or $(BOOTPRINT_DATA),../shared/data) docs
 	$(BIN)/python -m proving_ground.radio_load.figures $(or $(BOOTPRINT_DATA),../shared/data) docs
 	PYTHONPATH=tests $(BIN)/python -m support.page_pictures docs/img
@@ -70,10 +72,13 @@ vectors: $(READY) ## write the radio's test vectors anew; review the difference
 page-load: $(READY) $(PAGE) ## the page with 500 soldiers at 2 Hz in a real browser (needs Chromium; ARGS='--seconds 60')
 	PYTHONPATH=tests $(BIN)/python -m support.page_load $(ARGS)
 
+kills: $(READY) ## kill -9 of a command post's hub in the middle of writing, fifty times on SQLite and on PostgreSQL
+	PYTHONPATH=tests $(BIN)/python -m support.killed_hub $(ARGS)
+
 fuzz: $(READY) ## ten million mutated and random radio frames (ARGS='--frames 100000' for fewer)
 	PYTHONPATH=tests $(BIN)/python -m support.radio_fuzz $(ARGS)
 
-compose-test: ## build the image, run docker-compose.yml for real (needs a Docker engine)
+compose-test: ## build the images, run docker-compose.yml for real (needs a Docker engine)
 	deploy/compose-test
 
 wheels: $(READY) ## all that an installation without a network needs, tried out; ARGS=aarch64: for ARM boards, not tried

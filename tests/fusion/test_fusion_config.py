@@ -39,6 +39,9 @@ def test_an_empty_section_has_all_defaults_and_builds(tmp_path: Path) -> None:
         "pressure",
         "body_step",
         "camera_motion",
+        "range",
+        "track",
+        "rooms",
     }
 
 

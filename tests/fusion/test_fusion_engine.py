@@ -379,7 +379,7 @@ def test_silent_boots_are_coasting_with_growing_covariance_then_lost() -> None:
     for tick in range(1, 160):
         out += core.tick(T0 + round((last_s + 0.5 * tick) * NS))
     late = [position for position in positions(out) if seconds(position) > last_s + 2.0]
-    assert [position.sequence for position in positions(out)] == list(range(len(out)))
+    assert [position.sequence for position in positions(out)] == list(range(len(positions(out))))
     modes = [position.mode for position in late]
     assert modes[0] == "coasting"
     assert modes[-1] == "lost"

@@ -9,9 +9,11 @@ import pytest
 
 from bootprint.bus import Envelope
 from bootprint.messages import Position
+from bootprint.remembering import Memory, RememberingPart
+from bootprint.saved_state import StateFile
 from fusion.config import FusionConfig
 from fusion.engine import FusionCore
-from fusion.memory import FusionPart, Saved, load, objection
+from fusion.memory import FILE, FORM, SAVE_EVERY_NS, Saved, kept_of, objection, understood
 from support.foot_walks import (
     EAST,
     LEFT,
@@ -100,7 +102,6 @@ def test_a_state_of_another_time_is_refused_in_words(resumed_s: float, words: st
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        ({"version": 99}, "version 99"),
         ({"soldier": "b7"}, "soldier 'b7'"),
         ({"reference": "third_foot"}, "feet"),
         ({"start": None}, "configured anew"),
@@ -121,28 +122,38 @@ def test_a_covariance_that_is_none_is_refused() -> None:
         assert objection(bad, WHO.soldier, CONFIG) == "covariance is none"
 
 
+def part_of(core: FusionCore, path: Path) -> RememberingPart:
+    return RememberingPart(
+        core, Memory(StateFile(path, FORM), SAVE_EVERY_NS, lambda: kept_of(core.remembered()))
+    )
+
+
+def saved_in(path: Path) -> Saved | None:
+    kept = StateFile(path, FORM).load()
+    return None if kept is None else understood(kept, WHO.soldier, CONFIG)
+
+
 def test_the_file_is_written_in_event_time_and_read_back(tmp_path: Path) -> None:
-    path = tmp_path / "state" / "fusion-state.msgpack"
+    path = tmp_path / "state" / FILE
     core = FusionCore(CONFIG, WHO, ORIGIN)
-    part = FusionPart(core, path)
-    assert load(path) is None
+    part = part_of(core, path)
+    assert saved_in(path) is None
     for one in MESSAGES[:400]:
         list(part.handle(one))
         list(part.tick(one.message.time_ns))
-    saved = load(path)
+    saved = saved_in(path)
     assert saved is not None
     assert MESSAGES[399].message.time_ns - saved.time_ns < 3 * NS
     list(part.close())
-    assert load(path) == core.remembered()
-    path.write_bytes(path.read_bytes()[:-7])
-    with pytest.raises(ValueError, match="damaged"):
-        load(path)
+    assert saved_in(path) == core.remembered()
 
 
 def test_a_disk_that_takes_nothing_costs_the_memory_only(tmp_path: Path) -> None:
     (tmp_path / "state").write_text("a file where a folder should be")
-    part = FusionPart(FusionCore(CONFIG, WHO, ORIGIN), tmp_path / "state" / "x")
+    part = part_of(FusionCore(CONFIG, WHO, ORIGIN), tmp_path / "state" / "x")
     for one in MESSAGES[:200]:
         list(part.handle(one))
     list(part.close())
-    assert part.figures().counters["memory_unsaved"] == 1
+    figures = part.figures()
+    assert figures.counters["memory_unsaved"] == 1
+    assert "state is not saved" in figures.note

@@ -201,3 +201,18 @@ def test_stairs_are_told_by_the_channel_before_the_tick_is_over() -> None:
     assert altimeter.climb(None).stairs < 0.05
     told = [altimeter.climb(pressure_height_m(101_325.0) + rise).stairs for rise in (0.0, 0.17)]
     assert told[1] > 10.0 * told[0]
+
+
+def test_later_pressure_tells_the_first_steps_of_stairs() -> None:
+    """A second and a half up from the level: what was hardly stairs at its time is surely stairs by now."""
+    altimeter = Probe()
+    walk(altimeter, [(20.0, 0.0, True), (0.5, 0.34, True)])
+    at_once = altimeter.climb(None).stairs
+    walk(altimeter, [(1.5, 0.34, True)])
+    later = altimeter.climb_at(round(20.4 * S))
+    assert later is not None
+    assert later.up
+    assert later.stairs > 0.7 > at_once
+    assert altimeter.climb_at(round(10.0 * S)) is None  # settled long ago
+    assert altimeter.climb_at(round(30.0 * S)) is None  # not yet
+    assert Altimeter().climb_at(0) is None

@@ -123,6 +123,16 @@ def test_still_stairs_and_crawling() -> None:
     assert classifier.update(pendulum(0.0, 4), tilt_rad=math.radians(75.0)).motion == "crawling"
 
 
+def test_nobody_climbs_stairs_sideways() -> None:
+    """A gust while somebody steps aside: as likely stairs as not by pressure alone."""
+    classifier = MovementClassifier()
+    for number in range(4):
+        classifier.update(pendulum(0.5 * math.pi, number))
+    assert classifier.update(pendulum(0.5 * math.pi, 4), Climb(0.8, True)).name == "left"
+    ahead = MovementClassifier()
+    assert ahead.update(pendulum(0.0), Climb(0.8, True)).name == "stairs_up"
+
+
 def test_corrections_are_those_of_the_source() -> None:
     rotation = SideStepRotation(math.radians(15.0))
     degrees = {

@@ -136,6 +136,17 @@ def test_a_run_that_saturates_16_g_and_2000_degrees_a_second() -> None:
     assert_holds(track, RUN, distance=0.03, end_m=0.6)
 
 
+def test_what_a_cut_peak_takes_along_is_an_error_that_steps_share() -> None:
+    """The same peak is cut off every stride: their turns err alike, beyond what a gyro's bias does (2.2 °/min)."""
+    bias = math.radians(2.3 / 60.0)
+    loose, cut = (
+        [step.common_turn_sigma_rad_s for step in navigate(stream_of(RUN, quality=quality)).steps]
+        for quality in (ImuQuality(gyro_limit_rad_s=1e3), ImuQuality(gyro_limit_rad_s=math.radians(400.0)))
+    )
+    assert max(loose) < bias
+    assert np.median(cut) > 3.0 * bias
+
+
 @pytest.mark.parametrize("accel", [0.99, 1.01])
 @pytest.mark.parametrize("gyro", [0.99, 1.01])
 def test_scale_errors_of_one_percent(accel: float, gyro: float) -> None:

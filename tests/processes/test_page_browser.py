@@ -18,11 +18,11 @@ from sa_hub.history.archive import Archive
 from sa_hub.page.access import new_token
 from sa_hub.page.settings import PageSettings
 from support.browser import CAN_RUN, WHY_NOT, Tab, running_chromium, tab
-from support.pmtiles_file import write_pmtiles
+from support.tiles import EXTENT, vector_tile, write_mbtiles, write_pmtiles
 from support.waiting import wait_until
 
 pytestmark = [pytest.mark.processes, pytest.mark.skipif(not CAN_RUN, reason=WHY_NOT)]
-expect.set_options(timeout=45_000)  # a page whose map is drawn in software on a busy machine takes its time
+expect.set_options(timeout=90_000)  # a page whose map is drawn in software on a busy machine takes its time
 Walked = tuple[Exercise, dict[str, Line]]
 SILENT = "a3"
 BEGIN_S = 45.0
@@ -41,7 +41,7 @@ def squad(walked: Walked, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     folder = tmp_path_factory.mktemp("page")
     archive = Archive(f"sqlite:///{folder / 'history.db'}")
     with ShownPlay(*walked, folder, Pace(2.0, BEGIN_S), archive=archive) as play:
-        wait_until(lambda: play.elapsed_s >= BEGIN_S, timeout_s=60.0, what="the squad's way until then")
+        wait_until(lambda: play.elapsed_s >= BEGIN_S, timeout_s=240.0, what="the squad's way until then")
         yield play
     archive.close()
 
@@ -60,25 +60,27 @@ def looking(chromium: Browser, squad: ShownPlay) -> Iterator[Tab]:
         assert found.faults == []
 
 
-def drawn(looking: Tab, soldier: str) -> tuple[float, float]:
-    """Latitude and longitude of a soldier's symbol on the map."""
-    script = f"""squad.map.map.querySourceFeatures("soldiers")
-        .filter(each => each.properties.id === "{soldier}").map(each => each.geometry.coordinates)[0]"""
-    longitude, latitude = looking.wait(script)
-    return latitude, longitude
-
-
 def test_soldiers_move_on_the_map(looking: Tab) -> None:
-    moving = looking.wait(
-        "squad.state.seen().find(each => Math.abs(each.track.east_velocity_m_s) > 0.4)?.track.soldier"
-    )
-    before = drawn(looking, moving)
+    looking.says("void (squad.before = new Map(squad.map.overlay.drawn))")
     looking.wait(
-        f"""squad.map.map.querySourceFeatures("soldiers").some(each => each.properties.id === "{moving}"
-        && Math.abs(each.geometry.coordinates[1] - {before[0]})
-        + Math.abs(each.geometry.coordinates[0] - {before[1]}) > 2e-5)"""
+        """[...squad.map.overlay.drawn].some(([id, { at }]) => (was => was
+        && Math.hypot(at[0] - was.at[0], at[1] - was.at[1]) > 2)(squad.before.get(id)))"""
     )
-    assert max(map(abs, ground_offset(before, drawn(looking, moving)))) < 100.0
+
+
+def test_symbols_stand_where_the_map_has_their_places(looking: Tab) -> None:
+    apart = looking.says(
+        """[...squad.map.overlay.drawn.values()].map(each => {
+        const place = squad.map.map.project(each.mark.place);
+        return Math.hypot(place.x - each.at[0], place.y - each.at[1]); })"""
+    )
+    assert len(apart) >= 7, "everybody but the lost one is in view"
+    assert max(apart) < 0.5
+    inked = looking.says(
+        """[...squad.map.overlay.drawn.values()].map(each => squad.map.overlay.canvas.getContext("2d")
+        .getImageData(each.at[0] * devicePixelRatio, each.at[1] * devicePixelRatio, 1, 1).data[3])"""
+    )
+    assert min(inked) > 100
 
 
 def test_a_lost_soldier_says_since_when_and_goes_on_counting(looking: Tab) -> None:
@@ -91,15 +93,13 @@ def test_a_lost_soldier_says_since_when_and_goes_on_counting(looking: Tab) -> No
         f"""document.querySelector('.row[data-soldier="{SILENT}"] .age').textContent !== {words!r}"""
     )
     assert seconds_lost(row.locator(".age").inner_text()) > first
-    label = looking.says(f'squad.state.seen().find(each => each.track.soldier === "{SILENT}").shown.words')
-    assert label.startswith("lost for")
-    assert (
-        looking.says(
-            f"""squad.map.map.querySourceFeatures("soldiers").find(each => each.properties.id === "{SILENT}")
-        .properties.opacity"""
-        )
-        < 0.9
-    )
+    row.click()
+    on_map = looking.wait(f'squad.map.overlay.drawn.get("{SILENT}")')
+    looking.page.keyboard.press("Escape")
+    looking.page.keyboard.press("f")
+    assert on_map["label"]
+    assert on_map["mark"]["label"][1]["text"].startswith("lost for")
+    assert on_map["mark"]["opacity"] < 0.9
 
 
 def seconds_lost(words: str) -> int:
@@ -117,14 +117,15 @@ def test_the_floor_switch_shows_that_floor_and_pales_the_others(looking: Tab) ->
             (squad.map.map.querySourceFeatures("plan", {{filter: ["==", "kind", "room"]}}))"""
         )
         looking.wait(
-            f"""squad.map.map.querySourceFeatures("soldiers").every(each => (each.properties.opacity > 0.3)
-            === (squad.state.tracks.get(each.properties.id).floor === {floor}))"""
+            f"""[...squad.map.overlay.drawn.values()].every(each =>
+            (each.mark.opacity > 0.3) === (squad.state.tracks.get(each.mark.id)?.floor === {floor}))"""
         )
     looking.page.keyboard.press("0")
 
 
 def test_an_alert_stays_until_somebody_acknowledges_it(looking: Tab, squad: ShownPlay) -> None:
     page = looking.page
+    where = page.locator("#map").bounding_box()
     page.keyboard.press("l")
     page.select_option('dialog [name="kind"]', "withdraw")
     page.fill('dialog [name="text"]', "by the stairs")
@@ -132,6 +133,7 @@ def test_an_alert_stays_until_somebody_acknowledges_it(looking: Tab, squad: Show
     banner = page.locator(".alert")
     expect(banner).to_contain_text("WITHDRAW")
     expect(banner).to_contain_text("by the stairs")
+    assert page.locator("#map").bounding_box() == where, "nothing moves under anybody's finger"
     page.keyboard.press("a")
     expect(banner).to_have_count(0)
     (alert,) = squad.desk.picture.all("alerts").values()
@@ -140,7 +142,6 @@ def test_an_alert_stays_until_somebody_acknowledges_it(looking: Tab, squad: Show
 
 def test_an_observation_lies_where_it_was_clicked(looking: Tab, squad: ShownPlay) -> None:
     page = looking.page
-    # What lies under the pointer is asked for at the click: a banner that comes or goes moves the map.
     looking.says(
         """void squad.map.map.once("click", () =>
         squad.clicked = squad.map.map.unproject([260, 330]))"""
@@ -175,7 +176,7 @@ def test_looking_back_shows_the_picture_of_then(looking: Tab) -> None:
     newest = looking.says("Math.max(...squad.state.seen().map(each => each.track.time_s))")
     assert moment_s - 15.0 < newest <= moment_s
     page.click("#play")
-    looking.wait(f"squad.state.past.time_s > {moment_s} + 1")
+    looking.wait(f"squad.state.past?.time_s > {moment_s} + 1")
     page.keyboard.press("Home")
     expect(page.locator("#line")).to_have_text("live")
 
@@ -191,15 +192,40 @@ def test_the_past_is_exported_as_a_download(looking: Tab) -> None:
     assert {each["properties"]["soldier"] for each in features} >= {f"a{n}" for n in range(1, 9)}
 
 
-def test_a_basemap_of_ones_own_lies_below_the_grid(chromium: Browser, walked: Walked, tmp_path: Path) -> None:
+def pixels() -> bytes:
     picture = io.BytesIO()
     Image.new("RGB", (256, 256), (30, 90, 40)).save(picture, "PNG")
-    write_pmtiles(tmp_path / "area.pmtiles", picture.getvalue())
+    return picture.getvalue()
+
+
+WORLD = ((0, 0), (EXTENT, 0), (EXTENT, EXTENT), (0, EXTENT))
+
+
+def test_a_basemap_of_ones_own_lies_below_the_grid(chromium: Browser, walked: Walked, tmp_path: Path) -> None:
+    write_pmtiles(tmp_path / "area.pmtiles", pixels())
     settings = PageSettings(port=0, basemap="area.pmtiles")
     with ShownPlay(*walked, tmp_path, settings=settings) as play, tab(chromium, play.address) as looking:
         looking.wait('squad.map.map.getSource("basemap") && squad.map.map.isSourceLoaded("basemap")')
         order = looking.says("squad.map.map.getStyle().layers.map(each => each.id)")
         assert order.index("ground") < order.index("basemap") < order.index("grid")
+        assert looking.faults == []
+
+
+@pytest.mark.parametrize(
+    ("name", "layer", "kind"),
+    [("area.pmtiles", "water", "ocean"), ("area.mbtiles", "building", "yes")],
+)
+def test_vector_tiles_are_drawn_by_the_names_of_their_layers(
+    chromium: Browser, walked: Walked, tmp_path: Path, name: str, layer: str, kind: str
+) -> None:
+    write = write_pmtiles if name.endswith(".pmtiles") else write_mbtiles
+    write(tmp_path / name, vector_tile(layer, WORLD, kind=kind), "pbf", [layer, "unheard_of"])
+    settings = PageSettings(port=0, basemap=name)
+    with ShownPlay(*walked, tmp_path, settings=settings) as play, tab(chromium, play.address) as looking:
+        looking.wait(
+            f"""squad.map.map.queryRenderedFeatures().some(each => each.source === "basemap"
+            && each.sourceLayer === "{layer}" && each.properties.kind === "{kind}")"""
+        )
         assert looking.faults == []
 
 

@@ -1,6 +1,7 @@
 """Load tests of real hubs: what a straight walker costs, that runs repeat, and that a cheat is found out."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,19 @@ def test_receivers_report_only_with_feedback() -> None:
     assert play("bootprint", SILENT, tracks).feedback_bits == 0
     with_feedback = Load(soldiers=4, bitrate=60, tracks="building", duration_s=60.0)
     assert play("bootprint", with_feedback, tracks).feedback_bits > 0
+
+
+def test_posts_that_tell_only_what_they_hear_make_foresight_needless() -> None:
+    tracks = squad(180.0, 15.0)
+    load = Load(soldiers=4, bitrate=60, loss=0.3, posts=True, foreseen=False, duration_s=180.0)
+    heard, deaf = HubSquad(load, tracks).run(), HubSquad(replace(load, feedback=False), tracks).run()
+    p95_m, deaf_p95_m = heard.errors.percentile_m(95.0), deaf.errors.percentile_m(95.0)
+    assert p95_m is not None
+    assert deaf_p95_m is not None
+    assert p95_m < 0.5 * deaf_p95_m
+    # Three posts, each at most about a quarter of its rate: they report nobody.
+    assert 0 < heard.feedback_bits < 3 * 0.4 * 60 * 180
+    assert deaf.feedback_bits == 0
 
 
 def test_a_wider_link_costs_its_headers() -> None:

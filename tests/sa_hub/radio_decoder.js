@@ -95,6 +95,7 @@ function anchor(place) {
 }
 
 const time = (ticks, age = 0, modulus = TICKS) => (unwrap(ticks, modulus, vectors.now_ticks) - age) / 10;
+const facing = (told) => (told.has_facing ? told.facing * 22.5 : null);
 const level = (told) => (told.has_floor ? told.floor - 32 : null);
 
 // East and north, m/s.
@@ -117,6 +118,7 @@ function reports(place, soldiers) {
       longitude_deg: (column + (soldier.east ?? 0) + 0.5) * cell,
       height_m: place.has_height && up !== null ? height + up : null,
       floor: level(soldier),
+      facing_deg: facing(soldier),
       east_m_s,
       north_m_s,
     };
@@ -136,6 +138,10 @@ function moved(latitude, longitude, east_m_s, north_m_s, seconds) {
 // Middle of the cell with these low bits that is nearest to where somebody is believed to be.
 const nearest = (low, modulus, degrees, cell) =>
   (low + modulus * Math.round((degrees / cell - 0.5 - low) / modulus) + 0.5) * cell;
+
+// Whether who stands is told within 4 m of where he was, and so faces as before.
+const stays = (before, [latitude, longitude], velocity) => !velocity.some(Boolean) && METRES_PER_DEG * Math.hypot(
+  before.latitude_deg - latitude, around(before.longitude_deg - longitude, 360) * cosine(before.latitude_deg)) < 4;
 
 // What the entries of an update mean to who has heard what the sender told before; the others are left out.
 function updated(update, entries, sender, told) {
@@ -158,6 +164,7 @@ function updated(update, entries, sender, told) {
       number, time_s: now_s - age_s, latitude_deg, longitude_deg, east_m_s, north_m_s,
       height_m: !entry.level ? before.height_m : known ? unwrap(entry.height, 256, before.height_m) : null,
       floor: entry.level ? level(entry) : before.floor,
+      facing_deg: entry.turned ? facing(entry) : stays(before, [latitude_deg, longitude_deg], [east_m_s, north_m_s]) ? before.facing_deg : null,
     }];
   });
 }

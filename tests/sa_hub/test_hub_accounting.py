@@ -24,7 +24,8 @@ def test_a_link_tells_how_old_everybodys_report_on_it_is() -> None:
     assert set(report.ages_s) == {"a1", "a2"}
     heard = air.tracks["a1", "a2"]
     assert report.ages_s["a2"] == pytest.approx((report.time_ns - heard.time_ns) / S, abs=0.01)
-    assert report.ages_s["a2"] > 20.0 > report.ages_s["a1"] + 5.0
+    # For 2 s after its last position a2 may still have told that one, moved on.
+    assert report.ages_s["a2"] > 17.0 > report.ages_s["a1"] + 5.0
 
 
 def test_expected_errors_are_unknown_before_the_first_frame_and_then_those_of_the_others() -> None:

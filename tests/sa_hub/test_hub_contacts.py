@@ -45,7 +45,7 @@ def test_a_relay_is_known_to_know_whom_it_passes_on() -> None:
 
 def test_a_soldier_proves_to_know_itself_and_what_it_says_to_have_heard_of_us() -> None:
     air = company()
-    air.run(41.0, WALKS)
+    air.run(61.0, WALKS)
     contacts = newest(air, "a1")
     assert {each.soldier: set(each.knows) for each in contacts.members} == {
         "a2": {"a1", "a2"},

@@ -413,7 +413,7 @@ def test_replayed_frames_change_nothing() -> None:
     air = Air(a_squad())
     air.run(20.0, WALKS)
     cp = air.hubs["cp"]
-    frames = [data for _, _, net, data in air.log if net == "company"]
+    frames = [data for _, sender, net, data in air.log if (sender, net) == ("lead", "company")]
     outputs = [envelope for data in frames for envelope in cp.receive("company", data, air.now_ns)]
     assert outputs == []
     assert cp.figures().counters["radio_replayed"] == len(frames)

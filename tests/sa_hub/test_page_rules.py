@@ -46,7 +46,7 @@ def page_says(asked: dict[str, Any]) -> dict[str, Any]:
         return_completed_process=True,
         capture_output=True,
         text=True,
-        input=json.dumps(asked),
+        input=json.dumps({"tracks": [], "places": [], "ages": {}, "labels": [], "views": []} | asked),
         cwd=WEB,
     )
     assert done.returncode == 0, done.stderr
@@ -58,7 +58,7 @@ def test_the_page_shows_what_the_hub_would() -> None:
     dice = random.Random(1)
     found = [any_track(dice) for _ in range(COUNT)]
     asked = [{"track": msgspec.to_builtins(track_view(each)), "now_s": NOW_NS / 1e9} for each in found]
-    said = page_says({"tracks": asked, "places": [], "ages": {"stale_s": 75.0, "lost_s": 180.0}})
+    said = page_says({"tracks": asked, "ages": {"stale_s": 75.0, "lost_s": 180.0}})
     for track, page in zip(found, said["tracks"], strict=True):
         hub = shown(track, NOW_NS, AGES)
         longitude, latitude = page["place"]
@@ -72,10 +72,61 @@ def test_the_grid_lies_where_mgrs_says() -> None:
     dice = random.Random(2)
     # Where zones have no exceptions, and false northings are the northern ones.
     found = [(dice.uniform(-179.9, 179.9), dice.uniform(0.0, 55.9)) for _ in range(COUNT)]
-    said = page_says({"tracks": [], "places": found, "ages": {}})
+    said = page_says({"places": found})
     for place, page in zip(found, said["places"], strict=True):
         easting, northing = page["utm"]
         for own, told in ((easting, page["mgrs"][:5]), (northing, page["mgrs"][5:])):
             apart_m = (own - int(told)) % 100_000  # the digits are cut off, not rounded
             assert apart_m < 1.01 or apart_m > 99_999.99
         assert page["back"] == pytest.approx(place, abs=1e-8)
+
+
+def box(dice: random.Random) -> dict[str, float]:
+    return {"x": dice.uniform(0.0, 400.0), "y": dice.uniform(0.0, 300.0), "width": 30.0, "height": 34.0}
+
+
+def overlap(one: dict[str, float], other: dict[str, float]) -> bool:
+    return all(
+        one[at] < other[at] + other[size] and other[at] < one[at] + one[size]
+        for at, size in (("x", "width"), ("y", "height"))
+    )
+
+
+def test_names_cover_no_other_name_and_nobody_who_must_be_named_goes_without() -> None:
+    dice = random.Random(3)
+    wishes = [
+        {"id": f"a{n}", "symbol": box(dice), "width": 70.0, "height": 32.0, "must": n < 2} for n in range(60)
+    ]
+    (placed,) = page_says({"labels": [{"wishes": wishes, "before": {}}]})["labels"]
+    assert {"a0", "a1"} <= placed.keys()
+    assert 8 < len(placed) < 60, "a crowd: some find no room"
+    free = [each["box"] for name, each in placed.items() if name not in ("a0", "a1")]
+    assert not any(overlap(one, other) for n, one in enumerate(free) for other in free[:n])
+
+
+def test_a_name_stands_beside_its_symbol_and_stays_on_its_side() -> None:
+    symbol = {"x": 100.0, "y": 100.0, "width": 30.0, "height": 30.0}
+    neighbour = {"x": 140.0, "y": 100.0, "width": 30.0, "height": 30.0}
+    wish = {"width": 50.0, "height": 16.0, "must": False}
+    alone = {"wishes": [{"id": "a", "symbol": symbol} | wish], "before": {}}
+    beside = {
+        "wishes": [{"id": "a", "symbol": symbol} | wish, {"id": "b", "symbol": neighbour} | wish],
+        "before": {},
+    }
+    stays = {"wishes": alone["wishes"], "before": {"a": "below"}}
+    said = page_says({"labels": [alone, beside, stays]})["labels"]
+    assert said[0]["a"]["box"] == {"x": 134.0, "y": 107.0, "width": 50.0, "height": 16.0}
+    assert [each["a"]["side"] for each in said] == ["right", "left", "below"]
+
+
+def test_places_lie_on_the_screen_as_web_mercator_has_them() -> None:
+    # At zoom 0 the world is 512 px wide; the equator is in the middle, 85.0511 degrees north at the edge.
+    asked = [
+        {"centre": [0.0, 0.0], "zoom": 0.0, "place": [0.0, 0.0]},
+        {"centre": [0.0, 0.0], "zoom": 0.0, "place": [90.0, 85.051129]},
+        {"centre": [179.0, 0.0], "zoom": 1.0, "place": [-179.0, 0.0]},
+    ]
+    said = page_says({"views": asked})["views"]
+    assert said[0] == pytest.approx([500.0, 400.0])
+    assert said[1] == pytest.approx([628.0, 144.0], abs=1e-3)
+    assert said[2] == pytest.approx([500.0 + 1024.0 * 2.0 / 360.0, 400.0])

@@ -54,6 +54,7 @@ def reports(draw: st.DrawFn, number: int | None = None, hops: int | None = None)
         floor=draw(st.none() | st.integers(-32, 95)),
         condition=draw(st.sampled_from(CONDITIONS)),
         hops=draw(st.integers(0, 3)) if hops is None else hops,
+        facing_deg=draw(st.none() | st.floats(0.0, 360.0, **floats)),
     )
 
 
@@ -103,6 +104,9 @@ def assert_close(sent: Report, got: Report, resolution: int, age_s: float) -> No
         sent.condition,
         sent.hops,
     )
+    assert (got.facing_deg is None) == (sent.facing_deg is None)
+    if sent.facing_deg is not None and got.facing_deg is not None:
+        assert turned_deg(got.facing_deg, sent.facing_deg) <= 11.25
 
 
 def assert_velocity(sent: Report, got: Report) -> None:

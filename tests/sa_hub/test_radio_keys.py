@@ -8,6 +8,7 @@ import typer
 from typer.testing import CliRunner
 
 from bootprint.errors import ConfigError
+from bootprint.keys.secret_files import next_path
 from sa_hub.assembly import build_hub
 from sa_hub.commands import register
 from sa_hub.keys import (
@@ -16,7 +17,6 @@ from sa_hub.keys import (
     finish_roll,
     load_group_key,
     load_next_key,
-    next_path,
 )
 from sa_hub.radio.counters import MemoryCounters
 from sa_hub.radio.errors import FrameError
@@ -124,6 +124,24 @@ def test_the_roll_is_finished_a_day_later_and_not_before(tmp_path: Path) -> None
     assert [each.name for each in tmp_path.iterdir()] == ["group.key"]
 
 
+def test_a_lost_key_opens_nothing_from_the_change_on(tmp_path: Path) -> None:
+    path = tmp_path / "group.key"
+    create_group_key(path)
+    begins = datetime(2026, 12, 1, 6, tzinfo=UTC)
+    create_next_key(path, begins, is_lost=True)
+    coming = load_next_key(path)
+    assert coming is not None
+    roll = keys_of("squad", 8, load_group_key(path), coming)
+    captured = NetKeys(load_group_key(path), "squad", 8)
+    for after_s, is_taken in ((-1, True), (0, False), (3600, False)):
+        now_ns = coming.from_ns + after_s * S
+        frame = Sealer(captured, 7, MemoryCounters()).seal(b"x", now_ns)
+        assert opens(Opener(roll), frame, now_ns) == is_taken
+    # Nobody uses the old one any more, so there is no day to wait for.
+    finish_roll(path, begins.timestamp())
+    assert load_group_key(path) == coming.group_key
+
+
 @pytest.mark.parametrize(
     "content", ["", "00" * 32, "00" * 32 + "\nfrom tomorrow", "00" * 32 + "\nfrom 2026-12-01T06:00:00", "\n"]
 )
@@ -153,3 +171,8 @@ def test_the_commands_make_and_finish_a_next_key(tmp_path: Path) -> None:
     assert coming.group_key.hex() not in result.output
     assert CliRunner().invoke(app, ["keys", "finish", str(path)]).exit_code == 0
     assert load_group_key(path) == coming.group_key
+    roll = ["keys", "roll", str(path), "--at", "2021-05-01T06:00", "--lost"]
+    assert CliRunner().invoke(app, roll).exit_code == 0
+    lost = load_next_key(path)
+    assert lost is not None
+    assert (coming.overlap_ns, lost.overlap_ns) == (OVERLAP_NS, 0)

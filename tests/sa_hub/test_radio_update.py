@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from bootprint.config import Origin
 from bootprint.prediction import moved_m
 from sa_hub.radio.bits import BitReader, BitWriter
-from sa_hub.radio.content import Entry, Feedback, Level, Quality, Report, Reports, Update
+from sa_hub.radio.content import Entry, Facing, Feedback, Level, Quality, Report, Reports, Update
 from sa_hub.radio.errors import FrameError
 from sa_hub.radio.frame import Codec
 from sa_hub.radio.grid import Grid
@@ -33,6 +33,7 @@ qualities = st.none() | st.builds(
     Quality, st.integers(0, 7), st.integers(0, 6), st.integers(0, 3), st.integers(0, 3)
 )
 levels = st.none() | st.builds(Level, st.none() | st.integers(-32, 95), st.none() | st.integers(0, 255))
+facings = st.none() | st.builds(Facing, st.none() | st.integers(0, 15))
 speeds = st.integers(0, 15) | st.sampled_from(PACES)
 feedbacks = st.none() | st.integers(1, 8).flatmap(
     lambda steps: st.builds(
@@ -59,6 +60,7 @@ def an_entry(draw: st.DrawFn, number: int, reach: int, *, varied: bool) -> Entry
         draw(st.sampled_from([0, 0, 41, 60])),
         draw(qualities),
         draw(levels),
+        draw(facings),
         far,
         steady,
     )

@@ -20,6 +20,7 @@ KEY = (
     "right unit stuck from 80 s",
     "right unit clips at 150 °/s",
     "fusion dies",
+    "... in a corner",
 )
 
 

@@ -3,8 +3,9 @@
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
@@ -191,3 +192,21 @@ def test_a_looped_replay_at_a_multiple_of_speed_counts_on(tmp_path: Path) -> Non
         assert rising == sorted(set(rising))
     rates = [health.gauges.get("replay0.rate_hz.imu/left_foot", 0.0) for health in healths]
     assert max(rates) == pytest.approx(200.0, rel=0.1)
+
+
+@pytest.mark.processes
+def test_a_gateway_that_is_started_in_the_middle_of_a_walk_sends_what_is_still_to_come(
+    tmp_path: Path,
+) -> None:
+    write_walk(tmp_path / "walk")
+    started_s = time.time() - 10.0
+    source = f'{{ kind = "replay", path = "walk", start_time_s = {started_s}, skip_past = true }}'
+    received: list[Envelope] = []
+    with running_router() as router, closing(open_bus(router)) as bus:
+        bus.subscribe(A1.selector("imu", "left_foot"), received.append)
+        with gateway_process(write_config(tmp_path, source), "--router", router):
+            wait_until(lambda: len(received) >= 5, what="the rest of the walk")
+    first = received[0].message
+    assert first.time_ns > (started_s + 10.0) * 1e9 - 50 * 1e6  # of a batch that ends later
+    assert first.sequence == round((first.time_ns / 1e9 - started_s) * 200.0 / 10.0)
+    assert [one.message.sequence - first.sequence for one in received[:5]] == list(range(5))

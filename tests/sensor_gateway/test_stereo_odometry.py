@@ -57,6 +57,23 @@ def test_a_walk_is_right_to_a_per_cent(walk: Sequence) -> None:
     assert end_error_share(walk, said) < 0.01
 
 
+def test_landmarks_told_once_a_start_lie_on_walls_floor_or_ceiling(walk: Sequence) -> None:
+    said = motions(told(walk))
+    starts = [motion.start_time_ns for motion in said if motion.landmarks_m is not None]
+    assert starts == list(dict.fromkeys(motion.start_time_ns for motion in said))
+    off = []
+    for motion in said:
+        start = round(motion.start_time_ns * SMALL.rate_hz / 1e9)
+        points = (
+            walk.attitude[start].apply(np.array(motion.landmarks_m or ()).reshape(-1, 3))
+            + walk.place_m[start]
+        )
+        x, y, z = np.abs(points).T
+        off.append(np.min([np.abs(x - 5.0), np.abs(y - 4.0), z, np.abs(z - 2.8)], axis=0))
+    assert np.concatenate(off).size > 20
+    assert np.percentile(np.concatenate(off), 90) < 0.3
+
+
 def test_exposure_that_differs_between_eyes_and_images_changes_little(walk: Sequence) -> None:
     def exposed(image: Image, gain: float, offset: float) -> Image:
         return np.asarray(np.clip(gain * image + offset, 0.0, 255.0), dtype=np.uint8)

@@ -5,12 +5,13 @@ import sys
 import threading
 import time
 
+import numpy as np
 import pytest
 
 from bootprint import wire, zenoh_bus
 from bootprint.bus import Envelope
 from bootprint.errors import BusError
-from bootprint.messages import FootStep, Health, Pressure
+from bootprint.messages import FootStep, Health, ImuBatch, Pressure
 from bootprint.topics import BY_SUBJECT, Identity
 from bootprint.zenoh_bus import EmbeddedRouter, open_bus
 from support.routers import free_endpoint, running_router
@@ -34,6 +35,12 @@ def step(sequence: int) -> Envelope:
         covariance=(0.0,) * 10,
     )
     return Envelope(A1.address("foot_step", "left_foot"), message)
+
+
+def batch(number: int) -> Envelope:
+    times = np.array([number], dtype=np.int64)
+    samples = np.zeros((1, 3))
+    return Envelope(A1.address("imu", "left_foot"), ImuBatch.from_arrays(number, times, samples, samples))
 
 
 def test_messages_arrive_in_order_and_typed() -> None:
@@ -95,6 +102,26 @@ def test_events_survive_a_router_that_is_replaced() -> None:
     router = EmbeddedRouter(endpoint)
     sender.publish(step(5))
     wait_until(lambda: set(heard) >= {1, 2, 3, 4, 5}, timeout_s=30.0, what="steps sent while no router ran")
+    sender.close()
+    receiver.close()
+    router.close()
+
+
+def test_inertial_samples_that_no_router_carried_come_later_and_in_order() -> None:
+    endpoint = free_endpoint()
+    router = EmbeddedRouter(endpoint)
+    sender, receiver = open_bus(endpoint), open_bus(endpoint)
+    heard: list[int] = []
+    receiver.subscribe(A1.selector("imu"), lambda e: heard.append(e.message.sequence))
+    sender.publish(batch(1))
+    wait_until(lambda: 1 in heard)
+    router.close()
+    for n in range(2, 60):
+        sender.publish(batch(n))
+    router = EmbeddedRouter(endpoint)
+    numbers = iter(range(60, 10_000))
+    wait_until(lambda: sender.publish(batch(next(numbers))) or len(heard) > 60, timeout_s=30.0)
+    assert heard == list(range(1, len(heard) + 1))
     sender.close()
     receiver.close()
     router.close()
@@ -194,7 +221,7 @@ def test_decoders_stand_before_any_thread_asks_for_one() -> None:
     # Two threads that build msgspec decoders of one struct at once crash the process.
     script = (
         "import sys, threading; sys.setswitchinterval(1e-6);"
-        "from bootprint import wire; from bootprint.messages import Pressure;"
+        "from bootprint import wire; from bootprint.messages import ImuBatch, Pressure;"
         "data = wire.encode(Pressure(time_ns=1, pressure_pa=1.0));"
         "threads = [threading.Thread(target=wire.decode, args=('pressure', data)) for _ in range(24)];"
         "[t.start() for t in threads]; [t.join() for t in threads]"

@@ -88,3 +88,8 @@ def test_the_command_line_chooses_the_clock() -> None:
 def test_a_clock_that_cannot_be_is_refused(speed: str, origin_s: float | None, said: str) -> None:
     with pytest.raises(ConfigError, match=said):
         make_clock(speed, origin_s)
+
+
+def test_a_clock_that_is_wrong_is_wrong_by_its_offset() -> None:
+    right, ahead = make_clock("1", None), make_clock("1", None, 3600.0)
+    assert (ahead.now_ns() - right.now_ns()) / 1e9 == pytest.approx(3600.0, abs=5.0)

@@ -18,8 +18,18 @@ WHY_NOT = (
     "no Chromium (apt-get install chromium)" if CHROMIUM is None else "the page is not built (make page)"
 )
 CAN_RUN = CHROMIUM is not None and IS_BUILT
-_ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox", "--mute-audio"]
+# WebGL by software, and all else as a browser without graphics hardware does it: imitated hardware is slow.
+_ARGUMENTS = [
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",
+    "--disable-gpu-rasterization",
+    "--disable-accelerated-2d-canvas",
+    "--no-sandbox",
+    "--mute-audio",
+]
 _LOOK_MS = 50
+_PATIENCE_MS = 90_000
 _ALONE = "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"
 
 
@@ -34,7 +44,7 @@ class Tab:
         """The value of an expression in the page, where ``squad`` is the map's handle."""
         return self.page.evaluate(f"(() => {{ const squad = window.bootprint; return ({script}); }})()")
 
-    def wait(self, script: str, timeout_s: float = 45.0) -> Any:
+    def wait(self, script: str, timeout_s: float = _PATIENCE_MS / 1000) -> Any:
         """Until an expression in the page is true, then its value.
 
         Looked at from here: the page's own rules forbid it to evaluate strings.
@@ -66,6 +76,7 @@ def tab(chromium: Browser, address: str, width: int = 1000, height: int = 640) -
         if urlsplit(request.url).netloc not in (home, ""):
             found.faults.append(f"asks {request.url}")
 
+    page.set_default_timeout(_PATIENCE_MS)  # of a busy machine
     page.on("request", note_foreign)
     page.on("pageerror", lambda error: found.faults.append(str(error)))
     page.goto(address)

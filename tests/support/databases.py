@@ -26,8 +26,8 @@ def _program(name: str) -> str | None:
 
 
 @contextmanager
-def postgres() -> Iterator[str]:
-    """A running server's folder; skips where PostgreSQL is not installed."""
+def postgres(*, fsync: bool = False) -> Iterator[str]:
+    """A running server's folder; skips where PostgreSQL is not installed. ``fsync``: as servers do for real."""
     initdb, server = _program("initdb"), _program("postgres")
     if initdb is None or server is None:
         pytest.skip(
@@ -42,7 +42,8 @@ def postgres() -> Iterator[str]:
     try:
         setup = [initdb, "-D", data, "-U", "postgres", "--auth=trust", "--no-sync", "-E", "UTF8"]
         subprocess.run(setup, check=True, stdout=subprocess.DEVNULL, cwd="/", **user)
-        options = ["-c", f"unix_socket_directories={folder}", "-c", "listen_addresses=", "-c", "fsync=off"]
+        options = ["-c", f"unix_socket_directories={folder}", "-c", "listen_addresses="]
+        options += ["-c", f"fsync={'on' if fsync else 'off'}"]
         with (folder / "log").open("wb") as log:
             process = subprocess.Popen([server, "-D", data, *options], stderr=log, cwd="/", **user)
         _wait_for(folder, process)

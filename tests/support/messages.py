@@ -95,11 +95,11 @@ envelopes: st.SearchStrategy[Envelope] = st.sampled_from(TOPICS).flatmap(
 
 
 def plain(message: m.Message) -> dict[str, Any]:
-    """A message's fields by name, structs in them likewise."""
+    """A message's fields by name, structs in them likewise; tuples within tuples are lists, as they are read."""
     return {name: _plain(value) for name, value in msgspec.structs.asdict(message).items()}
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, within: type[tuple[Any, ...]] | type[list[Any]] = tuple) -> Any:
     if isinstance(value, tuple):
-        return tuple(map(_plain, value))
+        return within(_plain(each, list) for each in value)
     return msgspec.structs.asdict(value) if isinstance(value, msgspec.Struct) else value

@@ -19,6 +19,7 @@ from sa_hub.radio.content import (
     AlertNotice,
     Content,
     Entry,
+    Facing,
     Feedback,
     Level,
     Notice,
@@ -81,6 +82,7 @@ STRUCTURE: dict[Kind, list[Part]] = {
     Kind.ACKNOWLEDGEMENT: [Part(layout.ACKNOWLEDGEMENT), Part(layout.ACKNOWLEDGED, "frames + 1")],
     Kind.REQUEST: [Part(layout.REQUEST), Part(layout.UNREAD, "unread == 15 ? 0 : unread")],
     Kind.FRAGMENT: [Part(layout.FRAGMENT), replace(_ASKED, then_bytes="data_bytes")],
+    Kind.FEEDBACK: [Part(layout.FEEDBACK_ALONE), Part(layout.FEEDBACK)],
 }
 TABLES: dict[str, tuple[Sequence[str], Sequence[int]]] = {
     "cells": (("lattice", "wide"), [resolution for resolution, _ in layout.LATTICES]),
@@ -95,7 +97,7 @@ that is there of these, numbers)."""
 def contents() -> Iterator[tuple[str, Content, Asked | None]]:
     """Something of every kind: (what it shows, content, who is to acknowledge it)."""
     walker = Report(SENDER, NOW_NS - S, 59.3514, 18.0721, 1.2, 0.7, 1.1, 52.0, floor=2)
-    far = Report(SENDER, NOW_NS, -33.86, 151.21, 30.0, mode="gnss", condition="wounded")
+    far = Report(SENDER, NOW_NS, -33.86, 151.21, 30.0, mode="gnss", condition="wounded", facing_deg=200.0)
     yield "own report, walking on the second floor", Reports((walker,)), None
     yield "own report, far from the origin, standing", Reports((far,)), None
     squad = tuple(
@@ -116,6 +118,7 @@ def contents() -> Iterator[tuple[str, Content, Asked | None]]:
     yield "request of a newcomer", Request(1, None), None
     yield "request of one who cannot open two senders", Request(12, (4, 1001)), None
     yield "fragment", Fragment(5, 1, 2, "förrådet".encode()), Asked((8,))
+    yield "feedback alone", Feedback(1, 0x3A9, 16, 0b1101_0111_1111_0001), None
 
 
 def _reports_for_updates() -> Iterator[tuple[str, Content, None]]:
@@ -151,6 +154,18 @@ def _updates() -> Iterator[tuple[str, Content, None]]:
     )
     all_told = replace(_update(4, 8, 14, *changed), feedback=Feedback(1, 17, 4, 0b0110))
     yield "update of four, much has changed, one is not known", all_told, None
+    covering = (
+        _entry(2, 59.3502, 18.06982, None, facing=Facing(5)),
+        _entry(3, 59.3503, 18.06973, None, facing=Facing(15)),
+        _entry(9, 59.3509, 18.06919, None),
+    )
+    yield "update of three who stand, two face somewhere", _update(3, 5, 2, *covering), None
+    gone_on = (
+        _entry(2, 59.3502, 18.06982, None),
+        _entry(3, 59.3504, 18.06964, None, facing=Facing(None)),
+        _entry(9, 59.3509, 18.06919, None, quality=Quality(2, 4, 1, 0)),
+    )
+    yield "update of the three, one faces as before, one no more", _update(3, 5, 2, *gone_on), None
     fine = (_entry(2, 59.35021, 18.06979, (4, 6)), _entry(3, 59.35031, 18.06969, None))
     yield "update on fine cells", _update(1, 6, 1, *fine), None
     going_on = (
@@ -171,11 +186,12 @@ def _entry(
     age_ticks: int = 0,
     quality: Quality | None = None,
     level: Level | None = None,
+    facing: Facing | None = None,
 ) -> Entry:
     """With the place on the finest lattice."""
     grid = Grid(ORIGIN)
     row, column = grid.row(latitude_deg, 0), grid.column(longitude_deg, 0)
-    return Entry(number, row, column, velocity, age_ticks, quality, level)
+    return Entry(number, row, column, velocity, age_ticks, quality, level, facing)
 
 
 def _update(resolution: int, reach_bits: int, misses: int, *entries: Entry) -> Update:
@@ -307,7 +323,7 @@ def meant(opened: Opened, content: Content, references: References) -> Sequence[
             return content.reports
         case Update():
             return references.resolve(*frame, content, NOW_NS)
-        case Acknowledgement() | Request() | Fragment():
+        case Acknowledgement() | Request() | Fragment() | Feedback():
             return ()
         case _:
             return (content,)
@@ -316,7 +332,7 @@ def meant(opened: Opened, content: Content, references: References) -> Sequence[
 def _meaning(item: Report | Notice) -> dict[str, Any]:
     """Who, when, where, how fast, and text."""
     names = ("number", "time_ns", "latitude_deg", "longitude_deg", "height_m", "text")
-    motion = ("east_m_s", "north_m_s", "floor")
+    motion = ("east_m_s", "north_m_s", "floor", "facing_deg")
     return {name: getattr(item, name) for name in (*names, *motion) if hasattr(item, name)}
 
 

@@ -81,17 +81,18 @@ class DataClock:
         return 0.0
 
 
-def make_clock(speed: str, origin_s: float | None) -> EventClock:
+def make_clock(speed: str, origin_s: float | None, offset_s: float = 0.0) -> EventClock:
     """A clock from the command line's ``--speed`` (a number, or ``max``) and ``--clock-origin`` (UTC seconds).
 
-    ConfigError if either makes no sense.
+    ``offset_s`` is added to the host's clock. ConfigError if any makes no sense.
     """
     if origin_s is not None and not 0 <= origin_s < _YEAR_2100_S:
         raise ConfigError(f"--clock-origin {origin_s} must be UTC seconds since 1970, before the year 2100")
     if speed == "max":
         return DataClock()
     origin_ns = time.time_ns() if origin_s is None else round(origin_s * NS_PER_S)
-    return ScaledClock(_speed(speed), origin_ns)
+    offset_ns = round(offset_s * NS_PER_S)
+    return ScaledClock(_speed(speed), origin_ns, lambda: time.time_ns() + offset_ns)
 
 
 def _speed(text: str) -> float:

@@ -14,6 +14,7 @@ import msgspec
 
 from bootprint.config_errors import Misfit, explain
 from bootprint.errors import ConfigError
+from bootprint.keys.credentials import Credentials, credentials_in, is_secure, stays_here
 from bootprint.messages import Latitude, Longitude
 from bootprint.topics import Identity, check_part
 
@@ -67,6 +68,21 @@ class Realm(Config, frozen=True):
         return {member.number: member for member in self.roster}
 
 
+class BusTable(Config, frozen=True):
+    """``[bus]``: other computers at this one's router, always with certificates on both sides.
+
+    ``listen``: where it awaits them; ``connect``: routers that it joins, those of other command posts.
+    """
+
+    listen: tuple[str, ...] = ()
+    connect: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for endpoint in (*self.listen, *self.connect):
+            if not is_secure(endpoint):
+                raise ValueError(f"{endpoint!r} is open to everybody; want tls/HOST:PORT or quic/HOST:PORT")
+
+
 class ComputerFile(Config, frozen=True):
     """``computer.toml`` as it stands in the file; sections are converted by the services they belong to."""
 
@@ -75,6 +91,7 @@ class ComputerFile(Config, frozen=True):
     router: str = "tcp/127.0.0.1:7447"
     state_dir: str = "state"
     keys_dir: str = "keys"
+    bus: BusTable = BusTable()
     gateway: dict[str, Any] = {}
     pdr: dict[str, Any] = {}
     fusion: dict[str, Any] = {}
@@ -91,12 +108,23 @@ class Computer:
     router: str
     state_dir: Path
     keys_dir: Path
+    bus: BusTable = field(default_factory=BusTable)
     sections: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     @property
     def identity(self) -> Identity:
         """The part of the key that all of this computer's topics share."""
         return Identity(self.realm.id, self.member.unit, self.member.id)
+
+    @property
+    def credentials(self) -> Credentials:
+        """What this computer shows on the bus, where it is asked."""
+        return credentials_in(self.keys_dir)
+
+    @property
+    def is_guarded(self) -> bool:
+        """Whether its router admits by certificate."""
+        return any(map(is_secure, (self.router, *self.bus.listen, *self.bus.connect)))
 
     def section(self, name: str, type_: type[T]) -> T:
         """One service's section, strictly converted; ConfigError says what is wrong and where."""
@@ -110,6 +138,7 @@ class Computer:
 def load_computer(path: Path) -> Computer:
     """Read ``computer.toml`` and the realm it names; ConfigError on anything wrong in either."""
     file = load_toml(path, ComputerFile)
+    _check_router(file, path)
     realm = load_realm(path.parent / file.realm)
     return Computer(
         path=path,
@@ -118,8 +147,19 @@ def load_computer(path: Path) -> Computer:
         router=file.router,
         state_dir=path.parent / file.state_dir,
         keys_dir=path.parent / file.keys_dir,
+        bus=file.bus,
         sections={name: getattr(file, name) for name in ("gateway", "pdr", "fusion", "hub")},
     )
+
+
+def _check_router(file: ComputerFile, path: Path) -> None:
+    """ConfigError if others could come in without a certificate where a certificate is asked of others."""
+    guarded = file.bus.listen or file.bus.connect
+    if guarded and not (is_secure(file.router) or stays_here(file.router)):
+        raise ConfigError(
+            f"{path}: router = {file.router!r} is open to everybody, which makes [bus] useless; "
+            "want tls/HOST:PORT, or an address that stays here such as tcp/127.0.0.1:7447"
+        )
 
 
 def load_realm(path: Path) -> Realm:

@@ -4,6 +4,7 @@ import ctypes
 import platform
 import sys
 from collections.abc import Iterable, Iterator
+from datetime import UTC, datetime
 from importlib.metadata import entry_points, version
 from pathlib import Path
 from typing import Final
@@ -11,6 +12,7 @@ from typing import Final
 from bootprint.config import Computer, load_computer
 from bootprint.errors import BusError, ConfigError
 from bootprint.findings import GROUP, Finding, folder
+from bootprint.keys.findings import key_findings
 from bootprint.upkeep import configured
 from bootprint.zenoh_bus import open_bus
 
@@ -30,6 +32,7 @@ def examine(config: Path) -> Iterator[Finding]:
         return
     yield _belongs(computer)
     yield from folder("state", computer.state_dir)
+    yield from key_findings(computer, datetime.now(UTC))
     yield from _rooms(computer)
     yield from _running(computer)
 
@@ -73,7 +76,7 @@ def _rooms(computer: Computer) -> Iterable[Finding]:
 
 def _running(computer: Computer) -> Iterator[Finding]:
     try:
-        bus = open_bus(computer.router, timeout_s=_ROUTER_WAIT_S)
+        bus = open_bus(computer.router, credentials=computer.credentials, timeout_s=_ROUTER_WAIT_S)
     except BusError as error:
         yield Finding("warning", "router", str(error), f"`bootprint up {computer.path}` runs everything")
         return

@@ -52,9 +52,20 @@ ObservationCode = Literal[
     "entrance",
     "building",
     "route",
+    "friendly",
 ]
 HARMLESS_CODES: frozenset[ObservationCode] = frozenset(
-    ("casualty", "civilian", "rally_point", "landing_zone", "supply", "entrance", "building", "route")
+    (
+        "casualty",
+        "civilian",
+        "rally_point",
+        "landing_zone",
+        "supply",
+        "entrance",
+        "building",
+        "route",
+        "friendly",
+    )
 )
 """Things observed that nobody means to shoot at."""
 TrackState = Literal["fresh", "stale", "lost"]
@@ -174,7 +185,8 @@ class CameraMotion(Message, frozen=True):
     happened since its key frame); a gap between one's end and the next one's start is time that nobody saw.
     ``covariance`` is the upper triangle (21 numbers, row by row) of the 6x6 matrix of
     (translation m, rotation vector rad), None if unknown. ``up``: where up is at the start, in the same axes, if an
-    inertial unit tells it.
+    inertial unit tells it. ``landmarks_m``: points seen at the start, in the same axes, well placed ones only; told
+    once a start, for maps of rooms.
     """
 
     start_time_ns: TimeNs
@@ -183,6 +195,7 @@ class CameraMotion(Message, frozen=True):
     covariance: Annotated[tuple[float, ...], msgspec.Meta(min_length=21, max_length=21)] | None = None
     confidence_pct: Percent | None = None
     up: Vector3 | None = None
+    landmarks_m: Annotated[tuple[Vector3, ...], msgspec.Meta(max_length=40)] | None = None
 
 
 class Range(Message, frozen=True):
@@ -254,7 +267,8 @@ class BodyStep(Message, frozen=True):
     """One step seen by a body-worn unit (compass, gyro, barometer).
 
     ``azimuth_rad`` is where the step led, ``direction`` how the feet went against where the body faces;
-    ``class_pct`` is the probability of motion and direction. ``floor`` counts from where the walk began. Redundancy
+    ``class_pct`` is the probability of motion and direction. ``settled_…`` tells what the step that ended at that
+    time, some steps earlier, was by all that followed. ``floor`` counts from where the walk began. Redundancy
     percentages say how much of the information is checked by other information; ``external_reliability_m`` what
     disturbances that nobody noticed may have done to the place since the last absolute fix.
     """
@@ -278,6 +292,9 @@ class BodyStep(Message, frozen=True):
     planimetry_redundancy_pct: Percent | None = None
     altimetry_redundancy_pct: Percent | None = None
     external_reliability_m: NonNegative | None = None
+    settled_time_ns: TimeNs | None = None
+    settled_motion: MotionClass | None = None
+    settled_direction: Direction | None = None
 
 
 class Fix(Message, frozen=True):
@@ -299,7 +316,8 @@ class Position(Message, frozen=True):
 
     ``rejections`` tells of each source that is left out why: ``innovation`` (its newest value is too far off),
     ``diverged`` (a foot that contradicts the other and looks wrong by itself),
-    ``spoofed`` (it has walked away from dead reckoning, and is not believed until it is back). ``protection_m``:
+    ``spoofed`` (it has walked away from dead reckoning, and is not believed until it is back), ``contradicted`` (a
+    peer whose range and place do not fit the other peers'). ``protection_m``:
     the horizontal error stays within with 95 %, even if a disturbance of the size that no check would notice has
     moved the position by ``external_reliability_m`` (METHODS A9).
     """
@@ -333,6 +351,7 @@ class Track(Message, frozen=True):
 
     ``held_m`` and ``held_s``: how well (one sigma), up to which age, reports of late have kept the prediction of
     this net's soldiers right; what that means for the doubt at an age, `bootprint.display` tells.
+    ``facing_rad``: of the body, clockwise from true north; over narrow radios it is known of some who stand.
     """
 
     soldier: Name
@@ -352,6 +371,7 @@ class Track(Message, frozen=True):
     hops: Count = 0
     held_m: NonNegative | None = None
     held_s: NonNegative | None = None
+    facing_rad: float | None = None
 
 
 class LinkReport(Message, frozen=True):

@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,10 +74,21 @@ class ProcessGroup:
         codes = {name: process.poll() for name, (_, process) in self._running.items()}
         ended = {name: code for name, code in codes.items() if code is not None}
         for name in ended:
-            _, process = self._running.pop(name)
-            if process.stdin:
-                process.stdin.close()
+            self._let_go(name)
         return ended
+
+    def take_dead(self, ours: Callable[[str], bool]) -> list[tuple[str, int]]:
+        """Those that ended with an error, of ``ours`` by name, with their exit codes; no longer of the group."""
+        codes = {name: process.poll() for name, (_, process) in self._running.items() if ours(name)}
+        dead = [(name, code) for name, code in codes.items() if code]
+        for name, _ in dead:
+            self._let_go(name)
+        return dead
+
+    def _let_go(self, name: str) -> None:
+        _, process = self._running.pop(name)
+        if process.stdin:
+            process.stdin.close()
 
     def check(self) -> None:
         """ProcessError if any process has ended with an error."""

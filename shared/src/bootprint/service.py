@@ -19,7 +19,7 @@ from typing import Annotated, Protocol
 import structlog
 import typer
 
-from bootprint import logs
+from bootprint import logs, pulse
 from bootprint.bus import Core, Envelope
 from bootprint.clock import EventClock, make_clock
 from bootprint.config import Computer, load_computer
@@ -102,6 +102,7 @@ class Options:
     router_wait_s: float = 10.0
     speed: str = "1"
     clock_origin_s: float | None = None
+    clock_offset_s: float = 0.0
     wait_for: tuple[str, ...] = ()
     stop_on_eof: bool = False
     beat_s: float = DEFAULT_BEAT_S
@@ -120,7 +121,7 @@ class Context:
         self.computer = computer
         self.options = options
         self.identity: Identity = computer.identity
-        self.clock: EventClock = make_clock(options.speed, options.clock_origin_s)
+        self.clock: EventClock = make_clock(options.speed, options.clock_origin_s, options.clock_offset_s)
         self.log: structlog.stdlib.BoundLogger = structlog.get_logger().bind(
             service=service, soldier=self.identity.soldier
         )
@@ -143,6 +144,7 @@ class Context:
         """Open the bus; BusError if no router answers in time."""
         self._bus = open_bus(
             self.options.router or self.computer.router,
+            credentials=self.computer.credentials,
             timeout_s=self.options.router_wait_s,
             lossless=self.lossless,
             should_stop=self.stopping.is_set,
@@ -207,6 +209,9 @@ class Service:
             float | None,
             typer.Option(help="UTC seconds at which event time equals host time (with --speed)."),
         ] = None,
+        clock_offset: Annotated[
+            float, typer.Option(help="Seconds to add to this computer's clock, which may be wrong.")
+        ] = 0.0,
         wait_for: Annotated[str, typer.Option(help="Services to wait for before replaying: a,b,c.")] = "",
         stop_on_eof: Annotated[bool, typer.Option(help="Stop when standard input closes.")] = False,
         beat: Annotated[
@@ -224,6 +229,7 @@ class Service:
             router_wait_s=router_wait,
             speed=speed,
             clock_origin_s=clock_origin,
+            clock_offset_s=clock_offset,
             wait_for=tuple(name for name in wait_for.split(",") if name),
             stop_on_eof=stop_on_eof,
             beat_s=beat,
@@ -348,6 +354,8 @@ class _Loop:
             self._connected = connected
             self._router_losses += not connected
             self._context.log.warning("router back" if connected else "router lost")
+        if connected:
+            pulse.beat(self._service.name)
 
     def _health(self, *, stopped: bool = False) -> Iterable[Envelope]:
         context = self._context

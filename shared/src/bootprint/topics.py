@@ -14,8 +14,11 @@ from bootprint import awareness as aware
 from bootprint import messages as m
 from bootprint.errors import WireError
 from bootprint.foreign import ForeignTrack
+from bootprint.rooms import RoomMap
 
 VERSION = "@v1"
+FRAMES = "@air1"
+"""Sealed frames of radio nets that run over zenoh: ``{realm}/@air1/{net}/{number}``, no topic."""
 _PART = re.compile(r"[A-Za-z0-9_.-]{1,64}\Z")
 
 
@@ -23,8 +26,15 @@ class Qos(Enum):
     """How a topic travels."""
 
     STREAM = "stream"  # dense samples: the newest matter, a congested bus may drop
+    RECENT = (
+        "recent"  # as a stream, and who comes late is told the last seconds: a restart has missed nothing
+    )
     ASSURED = "assured"  # events: cached by the publisher, recovered by subscribers that missed some
     STATE = "state"  # the newest value matters, and a late joiner gets it at once
+
+
+CACHED_SAMPLES = {Qos.RECENT: 160, Qos.ASSURED: 64, Qos.STATE: 1}
+"""How many messages of a key its publisher keeps for who comes late: eight seconds of inertial samples."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +56,7 @@ class Topic:
 
 TOPICS: tuple[Topic, ...] = (
     Topic(
-        "imu", m.ImuBatch, Qos.STREAM, 20.0, "sensor-gateway", True, "inertial samples, ~10 a message", 1.0
+        "imu", m.ImuBatch, Qos.RECENT, 20.0, "sensor-gateway", True, "inertial samples, ~10 a message", 1.0
     ),
     Topic("pressure", m.Pressure, Qos.STREAM, 10.0, "sensor-gateway", True, "air pressure", 1.0),
     Topic("gnss", m.GnssFix, Qos.STREAM, 1.0, "sensor-gateway", True, "satellite fixes", 9.0),
@@ -57,6 +67,15 @@ TOPICS: tuple[Topic, ...] = (
     Topic("body_step", m.BodyStep, Qos.ASSURED, None, "pdr-engine", True, "steps of the body-worn unit"),
     Topic("fix", m.Fix, Qos.ASSURED, None, "people", True, "a place given by a person"),
     Topic("position", m.Position, Qos.ASSURED, 5.0, "fusion", True, "the soldier's fused position"),
+    Topic(
+        "rooms",
+        RoomMap,
+        Qos.STATE,
+        None,
+        "fusion, sa-hub",
+        True,
+        "a soldier's map of rooms; from a hub: another's, source: who",
+    ),
     Topic(
         "aim", aware.Aim, Qos.STREAM, None, "weapon sensors, tools", True, "where a soldier's weapon points"
     ),

@@ -79,24 +79,24 @@ def _specs(
         *("--router-wait", str(_ROUTER_WAIT_S)),
         *("--log-level", log_level),
     )
-    router = spec(ROUTER, "bootprint", "router", "--listen", computer.router)
+    router = spec(ROUTER, "bootprint", "router", "--config", str(computer.path))
     return [
-        *([] if answers(computer.router) else [router]),
+        *([] if answers(computer) else [router]),
         *(spec(name, name, *common) for name in services),
     ]
 
 
-def answers(router: str) -> bool:
-    """Whether a router is there."""
-    bus = _try_bus(router)
+def answers(computer: Computer) -> bool:
+    """Whether its router is there."""
+    bus = _try_bus(computer)
     if bus is not None:
         bus.close()
     return bus is not None
 
 
-def _try_bus(router: str) -> ZenohBus | None:
+def _try_bus(computer: Computer) -> ZenohBus | None:
     try:
-        return open_bus(router, timeout_s=0.0)
+        return open_bus(computer.router, credentials=computer.credentials, timeout_s=0.0)
     except BusError:
         return None
 
@@ -147,7 +147,7 @@ class _Upkeep:
         """Health comes over the bus, as soon as there is one; zenoh finds a router that is replaced by itself."""
         if self._bus is not None:
             return
-        self._bus = _try_bus(self._computer.router)
+        self._bus = _try_bus(self._computer)
         if self._bus is not None:
             self._bus.subscribe(self._computer.identity.selector("health"), self._take)
 

@@ -8,6 +8,7 @@ thread per subscription; on closing, the session goes first and the threads are 
 """
 
 import json
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -18,11 +19,12 @@ from zenoh import ext
 from bootprint import wire
 from bootprint.bus import Envelope, Handler
 from bootprint.errors import BusError, WireError
-from bootprint.topics import BY_SUBJECT, Address, Identity, Qos, parse_key
+from bootprint.keys.credentials import Credentials, is_secure
+from bootprint.topics import BY_SUBJECT, CACHED_SAMPLES, Address, Identity, Qos, parse_key
+from bootprint.zenoh_config import Table, client_settings, router_settings
 
 RawHandler = Callable[[str, bytes], None]
 _CHANNEL_SIZE = 4096
-_CACHED_SAMPLES = {Qos.ASSURED: 64, Qos.STATE: 1}
 _MISS_HEARTBEAT_S = 0.5
 _RETRY_S = 0.2
 
@@ -31,40 +33,8 @@ _Samples = zenoh.handlers.Handler[zenoh.Sample]
 _Subscriber = zenoh.Subscriber[_Samples] | ext.AdvancedSubscriber[_Samples]
 
 
-def _client_config(router: str) -> zenoh.Config:
-    return zenoh.Config.from_json5(
-        json.dumps(
-            {
-                "mode": "client",
-                "connect": {
-                    "endpoints": [router],
-                    "timeout_ms": 0,
-                    "exit_on_failure": True,
-                    "retry": {
-                        "period_init_ms": 200,
-                        "period_max_ms": 2000,
-                        "period_increase_factor": 2,
-                    },
-                },
-                "listen": {"endpoints": []},
-                "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-                "transport": {"shared_memory": {"enabled": False}},
-            }
-        )
-    )
-
-
-def _router_config(endpoint: str) -> zenoh.Config:
-    return zenoh.Config.from_json5(
-        json.dumps(
-            {
-                "mode": "router",
-                "listen": {"endpoints": [endpoint]},
-                "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-                "transport": {"shared_memory": {"enabled": False}},
-            }
-        )
-    )
+def _config(table: Table) -> zenoh.Config:
+    return zenoh.Config.from_json5(json.dumps(table))
 
 
 class Inlet:
@@ -103,16 +73,39 @@ def _decode(key: str, payload: bytes) -> Envelope:
     return Envelope(address, wire.decode(address.subject, payload))
 
 
+def log_to_standard_output(what: str) -> None:
+    """Let zenoh log, in the terms of RUST_LOG; once a process, before anything is opened."""
+    os.environ["RUST_LOG"] = what
+    zenoh.try_init_log_from_env()
+
+
 class EmbeddedRouter:
     """A zenoh router inside this process (~22 MB); it routes in its own threads until closed."""
 
-    def __init__(self, endpoint: str) -> None:
-        """Listen at ``endpoint`` such as ``tcp/127.0.0.1:7447``; BusError if that is taken or malformed."""
+    def __init__(self, endpoint: str, settings: Table | None = None) -> None:
+        """Listen at ``endpoint`` such as ``tcp/127.0.0.1:7447``; BusError if that is taken or malformed.
+
+        ``settings``: zenoh's own, which then say all there is to say (`bootprint.zenoh_config`).
+        """
         try:
-            self._session = zenoh.open(_router_config(endpoint))
+            self._session = zenoh.open(_config(settings or router_settings([endpoint])))
         except zenoh.ZError as error:
             raise BusError(f"cannot start a router at {endpoint}: {_first_line(error)}") from error
         self.endpoint = endpoint
+
+    def bus(self) -> "ZenohBus":
+        """A way for the router itself to say something; closing it stops the router."""
+        return ZenohBus(self._session, lossless=False)
+
+    @property
+    def sessions(self) -> int:
+        """How many sessions are at this router."""
+        return len(list(self._session.info.transports()))
+
+    def name_of(self, session: str) -> str:
+        """The common name on a session's certificate, by the session's id; "" if there is none."""
+        names = (link.auth_identifier for link in self._session.info.links() if str(link.zid) == session)
+        return next(filter(None, names), "")
 
     def close(self) -> None:
         """Stop routing."""
@@ -122,17 +115,19 @@ class EmbeddedRouter:
 def open_bus(
     router: str,
     *,
+    credentials: Credentials | None = None,
     timeout_s: float = 5.0,
     lossless: bool = False,
     should_stop: Callable[[], bool] | None = None,
 ) -> "ZenohBus":
     """Connect to a router, waiting for it up to ``timeout_s``; BusError says what to do if none answers.
 
+    ``credentials``: what to show at an address that wants it (``tls/…``); ConfigError if they are not all there.
     ``lossless``: publishers wait instead of dropping and subscribers push back, for replay as fast as possible.
     """
     deadline = time.monotonic() + timeout_s
     try:
-        config = _client_config(router)
+        config = _config(client_settings(router, _checked(router, credentials)))
     except zenoh.ZError as error:
         raise BusError(f"router {router!r} is no address; want one like tcp/127.0.0.1:7447") from error
     while True:
@@ -146,6 +141,16 @@ def open_bus(
                     "or name another with --router"
                 ) from error
         time.sleep(_RETRY_S)
+
+
+def _checked(router: str, credentials: Credentials | None) -> Credentials | None:
+    """What is to be shown at that address."""
+    if not is_secure(router):
+        return None
+    if credentials is None:
+        raise BusError(f"router {router} wants a certificate: name this computer's file with --config")
+    credentials.check()
+    return credentials
 
 
 class ZenohBus:
@@ -182,18 +187,25 @@ class ZenohBus:
     def _new_publisher(self, address: Address) -> _Publisher:
         control = zenoh.CongestionControl.BLOCK if self._lossless else zenoh.CongestionControl.DROP
         qos = address.topic.qos
-        if qos is Qos.STREAM:
+        if self._is_plain(qos):
             return self._session.declare_publisher(address.key, congestion_control=control)
+        watched = (
+            qos is not Qos.RECENT
+        )  # where the next sample comes soon, it shows a hole as well as a heartbeat
         return ext.declare_advanced_publisher(
             self._session,
             address.key,
             congestion_control=control,
-            cache=ext.CacheConfig(max_samples=_CACHED_SAMPLES[qos]),
+            cache=ext.CacheConfig(max_samples=CACHED_SAMPLES[qos]),
             sample_miss_detection=ext.MissDetectionConfig(
-                heartbeat=None, sporadic_heartbeat=_MISS_HEARTBEAT_S
+                heartbeat=None, sporadic_heartbeat=_MISS_HEARTBEAT_S if watched else None
             ),
-            publisher_detection=True,
+            publisher_detection=watched,
         )
+
+    def _is_plain(self, qos: Qos) -> bool:
+        """Whether nothing is kept for who comes late; a replay at full speed has nobody who does."""
+        return qos is Qos.STREAM or (qos is Qos.RECENT and self._lossless)
 
     @property
     def rejected(self) -> int:
@@ -248,13 +260,14 @@ class ZenohBus:
 
     def _new_subscriber(self, selector: str) -> _Subscriber:
         topic = BY_SUBJECT.get(selector.split("/")[4]) if selector.count("/") == 5 else None
-        if topic is None or topic.qos is Qos.STREAM:
+        if topic is None or self._is_plain(topic.qos):
             return self._plain_subscriber(selector)
+        watched = topic.qos is not Qos.RECENT
         return ext.declare_advanced_subscriber(
             self._session,
             selector,
             self._channel(),
-            history=ext.HistoryConfig(detect_late_publishers=True, max_samples=_CACHED_SAMPLES[topic.qos]),
+            history=ext.HistoryConfig(detect_late_publishers=watched, max_samples=CACHED_SAMPLES[topic.qos]),
             recovery=ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
         )
 

@@ -63,6 +63,7 @@ LIMITS = (
 def register(app: typer.Typer) -> None:
     """Add the commands."""
     from proving_ground.evaluation.body_benchmark import body
+    from proving_ground.evaluation.federation_benchmark import federation
     from proving_ground.evaluation.history_benchmark import history
 
     group = typer.Typer(no_args_is_help=True, help="What the parts cost, and whether budgets hold.")
@@ -72,6 +73,7 @@ def register(app: typer.Typer) -> None:
     group.command()(budgets)
     group.command()(warnings)
     group.command()(history)
+    group.command()(federation)
     app.add_typer(group, name="benchmark")
 
 

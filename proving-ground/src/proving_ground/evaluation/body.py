@@ -82,6 +82,11 @@ def _heights_m(steps: Sequence[BodyStepEstimate], time_s: Sequence[float]) -> Fl
     return np.asarray(np.interp(time_s, at_s, height_m))
 
 
+def settled_names(steps: Sequence[BodyStepEstimate]) -> dict[int, str]:
+    """The class that each step, by its end in ns, was said to have had some steps later."""
+    return {one.time_ns: one.name for one in (step.settled for step in steps) if one is not None}
+
+
 def body_floors(steps: Sequence[BodyStepEstimate]) -> Floors | None:
     """The floors that steps told; None if none did."""
     told = [(step.time_ns / _NS_PER_S, step.height.floor) for step in steps if step.height is not None]

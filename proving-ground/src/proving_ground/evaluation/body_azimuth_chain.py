@@ -14,7 +14,13 @@ from pdr_engine.body import BodyNavigator, BodySettings, BodyStepEstimate
 from pdr_engine.body.azimuth.deviation import Deviation
 from pdr_engine.body.methods import settings_of
 from pdr_engine.body.pieces import FloatArray
-from proving_ground.evaluation.body_azimuth import CENTRAL_EUROPE, START_S, long_walk, walk_past_iron
+from proving_ground.evaluation.body_azimuth import (
+    CENTRAL_EUROPE,
+    START_S,
+    long_walk,
+    walk_past_iron,
+    wrapped,
+)
 from sensor_gateway.recordings.run import ImuSeries
 
 METHODS = ("default", "a7")
@@ -34,10 +40,11 @@ class Walked:
 
 def walked(imu: ImuSeries, torso_azimuth: FloatArray, method: str, blind_from_s: float = np.inf) -> Walked:
     """A walk by a method; ``torso_azimuth`` (n,) true, at the samples; no magnetometer from some time on."""
-    return _scored(_through(_navigator(method), imu, blind_from_s), imu, torso_azimuth)
+    return scored(through(_navigator(method), imu, blind_from_s), imu, torso_azimuth)
 
 
-def _scored(steps: Sequence[BodyStepEstimate], imu: ImuSeries, torso_azimuth: FloatArray) -> Walked:
+def scored(steps: Sequence[BodyStepEstimate], imu: ImuSeries, torso_azimuth: FloatArray) -> Walked:
+    """Steps (`through`) against the torso's azimuths (n,) at the samples."""
     starts_s, ends_s = np.array([(step.start_ns, step.time_ns) for step in steps]).T * 1e-9 - _EARLY_S
     borders = np.searchsorted(imu.time_s, np.array([starts_s, ends_s]))
     summed = np.concatenate([[0.0], np.cumsum(np.unwrap(torso_azimuth))])
@@ -45,7 +52,7 @@ def _scored(steps: Sequence[BodyStepEstimate], imu: ImuSeries, torso_azimuth: Fl
     truth -= CENTRAL_EUROPE.declination_rad
     compass = [np.nan if step.compass_azimuth_rad is None else step.compass_azimuth_rad for step in steps]
     published = np.array([step.azimuth_rad for step in steps])
-    return Walked(ends_s, _wrapped(published - truth), _wrapped(np.array(compass) - truth))
+    return Walked(ends_s, wrapped(published - truth), wrapped(np.array(compass) - truth))
 
 
 def _navigator(
@@ -68,9 +75,8 @@ def _navigator(
     return navigator
 
 
-def _through(
-    navigator: BodyNavigator, imu: ImuSeries, blind_from_s: float = np.inf
-) -> list[BodyStepEstimate]:
+def through(navigator: BodyNavigator, imu: ImuSeries, blind_from_s: float = np.inf) -> list[BodyStepEstimate]:
+    """The steps that a navigator makes of a series."""
     time_ns = np.round((imu.time_s + _EARLY_S) * 1e9).astype(np.int64)
     assert imu.mag_ut is not None
     found = []
@@ -89,12 +95,12 @@ def repeated_deg(seed: int, iron: float = 1.0) -> tuple[float, float]:
     first, _ = walk_past_iron(seed, iron)
     imu, torso_azimuth = walk_past_iron(seed, iron, person_seed=seed + 100)
     learner = _navigator("default", deviation_map=True)
-    _through(learner, first)
+    through(learner, first)
     errors = []
     for known in ((), learner.deviations):
         navigator = _navigator("default", deviation_map=bool(known), deviations=known)
-        walk = _scored(_through(navigator, imu), imu, torso_azimuth)
-        errors.append(_rms_deg(walk.error_rad[walk.end_s > walk.end_s[0] + START_S]))
+        walk = scored(through(navigator, imu), imu, torso_azimuth)
+        errors.append(rms_deg(walk.error_rad[walk.end_s > walk.end_s[0] + START_S]))
     return errors[0], errors[1]
 
 
@@ -103,8 +109,8 @@ def past_iron_deg(seed: int, iron: float) -> list[float]:
     imu, torso_azimuth = walk_past_iron(seed, iron)
     walks = [walked(imu, torso_azimuth, method) for method in METHODS]
     counted = [walk.end_s > walk.end_s[0] + START_S for walk in walks]
-    errors = [_rms_deg(walk.error_rad[chosen]) for walk, chosen in zip(walks, counted, strict=True)]
-    return [_rms_deg(walks[0].compass_error_rad[counted[0]]), *errors]
+    errors = [rms_deg(walk.error_rad[chosen]) for walk, chosen in zip(walks, counted, strict=True)]
+    return [rms_deg(walks[0].compass_error_rad[counted[0]]), *errors]
 
 
 def drifted_deg(seed: int) -> list[float]:
@@ -142,12 +148,9 @@ def chain_tables(seeds: range = range(1, 6, 2)) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _rms_deg(error_rad: FloatArray) -> float:
+def rms_deg(error_rad: FloatArray) -> float:
+    """Root mean square of errors (n,), NaN where there is none, degrees."""
     return float(np.degrees(np.sqrt(np.nanmean(error_rad**2))))
-
-
-def _wrapped(angle: FloatArray) -> FloatArray:
-    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 if __name__ == "__main__":

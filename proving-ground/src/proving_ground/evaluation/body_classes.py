@@ -12,7 +12,7 @@ import numpy as np
 
 from pdr_engine.body import BodySettings, BodyStepEstimate
 from pdr_engine.body.pieces import FloatArray
-from proving_ground.evaluation.body import walk_body
+from proving_ground.evaluation.body import settled_names, walk_body
 from proving_ground.evaluation.body_course import BODY_TYPES
 from proving_ground.evaluation.body_wearers import HAND, PLACEMENTS, Way, footfalls_s, walked, worn
 from proving_ground.people import GaitName, Leg, PersonMotion
@@ -42,16 +42,18 @@ SPEEDS_M_S: tuple[tuple[GaitName, float], ...] = (
 
 @dataclass(slots=True)
 class ClassScore:
-    """Steps by what they were and what they were told to be; ``feet``, ``found``: steps made and steps found, by
-    what they were."""
+    """Steps by what they were and what they were told to be, at once and as ``settled``; ``feet``, ``found``: steps
+    made and steps found, by what they were."""
 
     told: Counter[tuple[str, str]] = field(default_factory=Counter)
+    settled: Counter[tuple[str, str]] = field(default_factory=Counter)
     feet: Counter[str] = field(default_factory=Counter)
     found: Counter[str] = field(default_factory=Counter)
 
     def add(self, other: "ClassScore") -> None:
         """Together with another walk."""
         self.told += other.told
+        self.settled += other.settled
         self.feet += other.feet
         self.found += other.found
 
@@ -88,11 +90,14 @@ def course(crawls: bool) -> Iterator[Leg]:
 def score_classes(motion: PersonMotion, steps: Sequence[BodyStepEstimate]) -> ClassScore:
     """Each step by the activity amid it; at the seams between two either counts as right."""
     score = ClassScore()
+    names = settled_names(steps)
     for step in steps:
         said = told(step)
+        later = names[step.time_ns].replace("_", " ") if step.time_ns in names else said
         true = _truths(motion, step.start_ns / _NS_PER_S, step.time_ns / _NS_PER_S)
         amid = _truth_at(motion, 0.5 * (step.start_ns + step.time_ns) / _NS_PER_S)
         score.told[said if said in true else amid, said] += 1
+        score.settled[later if later in true else amid, later] += 1
         score.found[amid] += 1
     score.feet.update(_truth_at(motion, at_s) for at_s in footfalls_s(motion).tolist())
     return score
@@ -137,10 +142,19 @@ def classes_table(seeds: range = range(1, 2)) -> str:
         count = sum(together.told[true, told] for told in CLASSES)
         shares = " | ".join(_pct(together.told[true, told], count) for told in CLASSES)
         lines.append(f"| {true} | {count} | {shares} |")
-    lines += ["", f"| right % | {' | '.join(CLASSES)} |", "|---" * (1 + len(CLASSES)) + "|"]
-    for placement, score in by_placement.items():
-        lines.append(f"| {placement} | {' | '.join(_right(score, true) for true in CLASSES)} |")
+    lines += [
+        "",
+        f"| right %: at once, settled | {' | '.join(CLASSES)} |",
+        "|---" * (1 + len(CLASSES)) + "|",
+    ]
+    for name, score in (*by_placement.items(), ("all", together)):
+        lines.append(f"| {name} | {' | '.join(_both(score, true) for true in CLASSES)} |")
     return "\n".join(lines) + "\n"
+
+
+def _both(score: ClassScore, true: str) -> str:
+    """The shares right, at once and settled."""
+    return f"{_right(score.told, true)}, {_right(score.settled, true)}"
 
 
 def _all_types(placement: str, seeds: range) -> ClassScore:
@@ -151,8 +165,8 @@ def _all_types(placement: str, seeds: range) -> ClassScore:
     return score
 
 
-def _right(score: ClassScore, true: str) -> str:
-    return _pct(score.told[true, true], sum(score.told[true, told] for told in CLASSES))
+def _right(steps: Counter[tuple[str, str]], true: str) -> str:
+    return _pct(steps[true, true], sum(steps[true, told] for told in CLASSES))
 
 
 def _pct(part: int, whole: int) -> str:

@@ -13,6 +13,7 @@ import typer
 from bootprint.geomagnetism import EarthField
 from bootprint.messages import Direction
 from pdr_engine.body.movement.classes import MovementClassifier
+from pdr_engine.body.movement.direction import LAG
 from pdr_engine.body.movement.settlement import Settlement
 from pdr_engine.body.movement.side_step import SideStepRotation
 from pdr_engine.body.pieces import FloatArray, Stride
@@ -55,12 +56,16 @@ COURSES: dict[str, tuple[tuple[GaitName, float, float], ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class CourseScore:
-    """How one person's course was understood; ``rotation_deg`` learned in the side steps."""
+    """How one person's course was understood: steps ``right`` at once and as ``settled`` by those that followed.
+
+    ``rotation_deg`` was learned in the side steps.
+    """
 
     person: str
     course: str
     steps: int
     right: int
+    settled: int
     closing_m: float
     rotation_deg: float
 
@@ -72,20 +77,32 @@ def run_course(name: str, course: str, seed: int, quality: str = "industrial") -
     motion, strides = _walked(person, course, seed, quality)
     classifier, rotation = MovementClassifier(), SideStepRotation()
     place, heading, settlement = np.zeros(2), 0.0, Settlement()
-    right = total = 0
+    truths, at_once, later = [], [], []
     for stride in strides:
         allowed = _truth(motion, stride)
         if not allowed:
             continue
         found = classifier.update(stride).direction
+        truths.append(allowed)
+        at_once.append(found)
+        later += [classifier.directions.settled(LAG)] if len(truths) > LAG else []
         heading += stride.turn_rad
         rotation.update(found, heading - 0.5 * stride.turn_rad)
         ways = {way: length * _towards(stride, rotation, way) for way, length in lengths_m.items()}
         place += settlement.step(ways, classifier.directions)
-        total, right = total + 1, right + int(found in allowed)
-    return CourseScore(
-        name, course, total, right, float(np.hypot(*place)), float(np.degrees(rotation.rotation_rad))
-    )
+    later += at_once[len(later) :]
+    right, settled = (_right(told, truths) for told in (at_once, later))
+    rotation_deg = float(np.degrees(rotation.rotation_rad))
+    return CourseScore(name, course, len(truths), right, settled, float(np.hypot(*place)), rotation_deg)
+
+
+def _right(told: Sequence[Direction], truths: Sequence[set[Direction]]) -> int:
+    return sum(one in allowed for one, allowed in zip(told, truths, strict=True))
+
+
+def _share(right: Sequence[int], steps: FloatArray) -> str:
+    """Percent of all steps, and of the worst course's."""
+    return f"{100.0 * sum(right) / steps.sum():.1f} | {float((100.0 * np.array(right) / steps).min()):.1f}"
 
 
 def _towards(stride: Stride, rotation: SideStepRotation, direction: Direction) -> FloatArray:
@@ -97,16 +114,19 @@ def _towards(stride: Stride, rotation: SideStepRotation, direction: Direction) -
 def course_table(seeds: range = range(1, 10, 2)) -> str:
     """Markdown: a row for each body type, over both courses and these seeds."""
     lines = [
-        "| body type | courses | steps right % | worst course % | closing error %, mean | worst |",
-        "|---|---|---|---|---|---|",
+        "| body type | courses | steps right at once % | worst course % | settled % | worst course % "
+        "| closing error %, mean | worst |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for name in BODY_TYPES:
         scores = [run_course(name, course, seed) for course in COURSES for seed in seeds]
-        share = np.array([100.0 * score.right / score.steps for score in scores])
+        steps = np.array([score.steps for score in scores])
+        at_once, settled = (
+            _share([getattr(score, when) for score in scores], steps) for when in ("right", "settled")
+        )
         closing = np.array([100.0 * score.closing_m / COURSE_M for score in scores])
-        total = 100.0 * sum(score.right for score in scores) / sum(score.steps for score in scores)
         errors = f"{closing.mean():.2f} | {closing.max():.2f}"
-        lines.append(f"| {name} | {len(scores)} | {total:.1f} | {share.min():.1f} | {errors} |")
+        lines.append(f"| {name} | {len(scores)} | {at_once} | {settled} | {errors} |")
     return "\n".join(lines) + "\n"
 
 

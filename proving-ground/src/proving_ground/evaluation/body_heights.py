@@ -5,6 +5,7 @@ comes back by the stairs, in weather that drifts, wind and doors that slam. Step
 the navigator tells from the unit's samples and pressure.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -13,7 +14,7 @@ import numpy as np
 from pdr_engine.body import BodySettings, BodyStepEstimate
 from pdr_engine.body.pieces import FloatArray
 from pdr_engine.body.settings import AltitudeSettings
-from proving_ground.evaluation.body import walk_body
+from proving_ground.evaluation.body import settled_names, walk_body
 from proving_ground.evaluation.body_wearers import PLACEMENTS, Way, walked, worn
 from proving_ground.people import Leg, Person, PersonMotion
 from proving_ground.sensors import BAROMETER_CLASSES, Air, Area, DoorSlam
@@ -52,7 +53,9 @@ class HeightScore:
 
     stairs_error_m: list[float] = field(default_factory=list)
     lift_error_m: list[float] = field(default_factory=list)
-    told: dict[tuple[str, bool], int] = field(default_factory=dict)  # (way, taken for stairs up or down)
+    # By way, and whether it was taken for stairs up or down: at once, and as it was settled.
+    told: Counter[tuple[str, bool]] = field(default_factory=Counter)
+    settled: Counter[tuple[str, bool]] = field(default_factory=Counter)
     floors: list[bool] = field(default_factory=list)  # right, by step on a floor
     stays: list[bool] = field(default_factory=list)  # right, at the end of each level leg on a floor
 
@@ -111,6 +114,11 @@ def _scored(motion: PersonMotion, building: Building, steps: Sequence[BodyStepEs
     height_m = np.array([np.nan if step.height is None else step.height.height_m for step in steps])
     floor = np.array([0 if step.height is None else step.height.floor for step in steps])
     stairs = [step.motion == "stairs" for step in steps]
+    names = settled_names(steps)
+    later = [
+        names[step.time_ns].startswith("stairs") if step.time_ns in names else said
+        for step, said in zip(steps, stairs, strict=True)
+    ]
     truth_m, rate_m_s = _truth(motion, at_s)
     for activity in motion.activities:
         inside = np.flatnonzero((at_s >= activity.start_s) & (at_s < activity.end_s))
@@ -120,7 +128,8 @@ def _scored(motion: PersonMotion, building: Building, steps: Sequence[BodyStepEs
             errors.append(_climb_error(at_s, height_m - truth_m, activity.start_s, activity.end_s))
         for k in inside.tolist():
             if way != "stairs" or abs(rate_m_s[k]) > _CLIMBING_M_S:
-                score.told[way, stairs[k]] = score.told.get((way, stairs[k]), 0) + 1
+                score.told[way, stairs[k]] += 1
+                score.settled[way, later[k]] += 1
         true_floor = truth_m[inside] / building.storey_m
         if way == "level" and len(inside) and abs(true_floor[-1] - round(true_floor[-1])) < _ON_A_FLOOR:
             right = (floor[inside] == round(true_floor[-1])).tolist()
@@ -171,13 +180,21 @@ def _figures(scores: Sequence[HeightScore]) -> str:
     stays = [right for score in scores for right in score.stays]
     return (
         f"{np.median(stairs):.2f} | {stairs.mean():.2f} | {stairs.max():.2f} | {lift:.2f} "
-        f"| {told_pct(scores, 'stairs', stairs=True):.1f} | {told_pct(scores, 'slope', stairs=False):.1f} "
-        f"| {told_pct(scores, 'level', stairs=False):.1f} | {100.0 * np.mean(right):.1f} "
+        f"| {_both(scores, 'stairs', stairs=True)} | {_both(scores, 'slope', stairs=False)} "
+        f"| {_both(scores, 'level', stairs=False)} | {100.0 * np.mean(right):.1f} "
         f"| {sum(stays)} of {len(stays)}"
     )
 
 
-def told_pct(scores: Sequence[HeightScore], way: str, stairs: bool) -> float:
+def _both(scores: Sequence[HeightScore], way: str, stairs: bool) -> str:
+    """Percent of the steps on a way that were taken for stairs, or that were not: at once, and settled."""
+    return ", ".join(
+        f"{told_pct([getattr(score, when) for score in scores], way, stairs):.1f}"
+        for when in ("told", "settled")
+    )
+
+
+def told_pct(told: Sequence[Counter[tuple[str, bool]]], way: str, stairs: bool) -> float:
     """Percent of the steps on a way that were taken for stairs, or that were not."""
-    right, wrong = (sum(score.told.get((way, said), 0) for score in scores) for said in (stairs, not stairs))
+    right, wrong = (sum(one[way, said] for one in told) for said in (stairs, not stairs))
     return 100.0 * right / max(right + wrong, 1)

@@ -70,7 +70,8 @@ The fusion levels the camera's steps, learns how the camera is tilted from the h
 camera and feet together as METHODS D6 says: same horizontal position, constant vertical offset. While feet are
 silent the camera carries the position (mode `camera`) and takes the feet's part of the state along; feet that come
 back join it as they join each other, and lead again. The body's steps do not count meanwhile. After a gap the
-camera joins anew. Saved state and the smoother are of feet only.
+camera joins anew. Saved state and the smoother are of feet only. Well placed landmarks of each key frame go with
+its first motion, for the map of rooms ([rooms.md](rooms.md)): walls, and the space before them.
 
 ```toml
 [[gateway.sources]]          # live: two devices of rectified images

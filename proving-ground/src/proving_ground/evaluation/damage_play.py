@@ -1,7 +1,7 @@
 """One simulated walk of both boots through a live fusion, damaged on its way: what `damages` judges.
 
 Messages go in the order in which they arrive, ticks every tenth of a second, and a service that dies in the middle
-is back two seconds later, fusion with what it had saved and with the newest steps told again, as on the bus.
+is back two seconds later with what it had saved and with the newest steps or samples told again, as on the bus.
 """
 
 from collections import Counter, deque
@@ -15,12 +15,14 @@ from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.config import convert
 from bootprint.messages import FootStep, Position
-from bootprint.topics import Address, Identity
+from bootprint.topics import CACHED_SAMPLES, Address, Identity, Qos
 from fusion.config import FusionConfig
 from fusion.engine import FusionCore
 from fusion.memory import SAVE_EVERY_NS, Saved
 from pdr_engine.config import PdrConfig
 from pdr_engine.engine import EngineCore
+from pdr_engine.memory import SAVE_EVERY_NS as SAVE_ENGINE_EVERY_NS
+from pdr_engine.memory import Saved as SavedEngine
 from proving_ground.evaluation.alignment import FloatArray
 from proving_ground.evaluation.dual_walks import ORIGIN, DualWalk, dual_walk
 from sensor_gateway.recordings.run import FEET, Run
@@ -120,11 +122,12 @@ def played(
     satellites: bool = False,
     fusion_dies_s: float | None = None,
     engine_dies_s: float | None = None,
+    gateway_dies_s: float | None = None,
 ) -> Outcome:
     """The walk with these damages; the same for the same damages."""
     walk = the_walk()
     run = walk.run if satellites else replace(walk.run, gnss=None)
-    arrivals = _arrivals(run if on_run is None else on_run(run), engine_dies_s)
+    arrivals = _arrivals(run if on_run is None else on_run(run), engine_dies_s, gateway_dies_s)
     if on_stream is not None:
         arrivals = sorted(on_stream(arrivals), key=lambda arrival: arrival.at_ns)
     player = _Player(walk, satellites=satellites)
@@ -132,20 +135,51 @@ def played(
     return _outcome(player, walk)
 
 
-def _arrivals(run: Run, dies_s: float | None) -> list[Arrival]:
+def _arrivals(run: Run, engine_dies_s: float | None, gateway_dies_s: float | None) -> list[Arrival]:
     """Everything that fusion listens to."""
-    pdr = convert({"places": list(FEET)}, PdrConfig, where="trial")
-    engine, arrivals, died = EngineCore(pdr, _WHO, ORIGIN), [], False
+    engine, arrivals = _Engine(engine_dies_s), list[Arrival]()
     for envelope in run_messages(run, _WHO, BEGIN_NS):
         at_ns = due_ns(envelope.message)
-        if dies_s is not None and 0.0 <= (at_ns - BEGIN_NS) / NS_PER_S - dies_s < BACK_S:
-            engine, died = EngineCore(pdr, _WHO, ORIGIN), True
+        if _is_dead(gateway_dies_s, at_ns):
             continue
         if envelope.address.subject == "gnss":
             arrivals.append(Arrival(at_ns, envelope))
-        arrivals += [Arrival(at_ns, said) for said in engine.handle(envelope)]
-    assert died or dies_s is None
+        arrivals += [Arrival(at_ns, said) for said in engine.hear(envelope, at_ns)]
     return arrivals
+
+
+def _is_dead(dies_s: float | None, at_ns: int) -> bool:
+    return dies_s is not None and 0.0 <= (at_ns - BEGIN_NS) / NS_PER_S - dies_s < BACK_S
+
+
+class _Engine:
+    """A pdr-engine that may die: back, it goes on from what it had saved and is told the newest samples again."""
+
+    def __init__(self, dies_s: float | None) -> None:
+        self._dies_s = dies_s
+        self._config = convert({"places": list(FEET)}, PdrConfig, where="trial")
+        self._core: EngineCore | None = EngineCore(self._config, _WHO, ORIGIN)
+        self._saved: SavedEngine | None = None
+        self._saved_ns = BEGIN_NS
+        self._again: dict[Address, deque[Envelope]] = {}
+
+    def hear(self, envelope: Envelope, at_ns: int) -> list[Envelope]:
+        """What it says to a message."""
+        if envelope.address.subject == "imu":
+            told = self._again.setdefault(envelope.address, deque(maxlen=CACHED_SAMPLES[Qos.RECENT]))
+            told.append(envelope)
+        if _is_dead(self._dies_s, at_ns):
+            self._core = None
+            return []
+        if self._core is None:
+            return self._come_back()
+        if at_ns - self._saved_ns >= SAVE_ENGINE_EVERY_NS:
+            self._saved, self._saved_ns = self._core.remembered(), at_ns
+        return list(self._core.handle(envelope))
+
+    def _come_back(self) -> list[Envelope]:
+        core = self._core = EngineCore(self._config, _WHO, ORIGIN, saved=self._saved)
+        return [said for told in self._again.values() for one in told for said in core.handle(one)]
 
 
 class _Player:

@@ -253,15 +253,19 @@ DAMAGES: Sequence[Damage] = (
     ),
     of_the_right_unit("loses 20 % of samples", "within 1 m", within(1.0), missing(0.2)),
     dying("fusion dies", "goes on, within 0.8 m", within(0.8, "memory_gone_on_from"), fusion_dies_s=80.0),
-    dying("pdr-engine dies", "gap owned up to, within 8 m", within(8.0, "foot_restarts"), engine_dies_s=90.0),
-    dying("... in a corner", "gap owned up to", within(60.0, "foot_restarts"), engine_dies_s=80.0),
+    dying("pdr-engine dies", "goes on, within 0.8 m", within(0.8, "late_foot_step"), engine_dies_s=90.0),
+    dying("... in a corner", "goes on, within 0.8 m", within(0.8, "late_foot_step"), engine_dies_s=80.0),
     dying(
         "both die in a corner, with satellites",
-        "within 10 m",
-        within(10.0, "foot_restarts"),
+        "within 1.5 m",
+        within(1.5, "memory_gone_on_from"),
         satellites=True,
         engine_dies_s=80.0,
         fusion_dies_s=80.0,
+    ),
+    dying("gateway dies", "gap owned up to, within 8 m", within(8.0), gateway_dies_s=90.0),
+    dying(
+        "... in a corner, with satellites", "within 10 m", within(10.0), satellites=True, gateway_dies_s=80.0
     ),
     Damage("with satellites", "within 1.5 m", within(1.5, "gnss_accepted"), satellites=True),
     on_the_way(

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from bootprint.config import Origin
 from proving_ground.motion import FloatArray
-from proving_ground.people import Itinerary, Leg, Person, PersonMotion, move
+from proving_ground.people import GaitName, Itinerary, Leg, Person, PersonMotion, move
 from proving_ground.people.foot import INSTEP_M
 from proving_ground.sensors import (
     GNSS_CLASSES,
@@ -50,13 +50,14 @@ def dual_walk(
     seed: int,
     *,
     person: Person | None = None,
+    gait: GaitName = "walk",
     unit: ImuClass = UNIT,
     opposite_drift_rad_s: float = 0.0,
     satellites: bool = False,
 ) -> DualWalk:
-    """A person of this seed walks along a way (k points in the plane), at rest before and after it."""
+    """A person of this seed goes along a way (k points in the plane), at rest before and after it."""
     rng = np.random.default_rng([seed, 7])
-    motion = _walked(way_m, person or Person.drawn(rng), seed)
+    motion = _gone(way_m, person or Person.drawn(rng), gait, seed)
     imus = {place: _imu(motion, place, unit, rng) for place in FEET}
     if opposite_drift_rad_s != 0.0:
         signs = dict(zip(FEET, (1.0, -1.0), strict=True))
@@ -76,9 +77,9 @@ def dual_walk(
     return DualWalk(run, math.degrees(math.atan2(east, north)))
 
 
-def _walked(way_m: Sequence[tuple[float, float]], person: Person, seed: int) -> PersonMotion:
+def _gone(way_m: Sequence[tuple[float, float]], person: Person, gait: GaitName, seed: int) -> PersonMotion:
     way = np.array([(east, north, 0.0) for east, north in way_m])
-    legs = (Leg("stand", way[:1], REST_S), Leg("walk", way), Leg("stand", way[-1:], REST_S / 2))
+    legs = (Leg("stand", way[:1], REST_S), Leg(gait, way), Leg("stand", way[-1:], REST_S / 2))
     ahead = way[1] - way[0]
     return move(person, Itinerary(legs, start_yaw_rad=float(np.arctan2(ahead[1], ahead[0]))), seed)
 

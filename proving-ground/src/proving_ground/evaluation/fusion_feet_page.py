@@ -69,8 +69,8 @@ _DAMAGES = """
 
 270 m, simulated, a start given, no satellites unless named. Errors are of the published position, without a fit.
 The bounds were set for this walk after the first runs of it had shown what is usual; what they hold is behaviour,
-not accuracy. "As expected: no" is a limit that is known: when nobody sees a soldier turn a corner, the heading is
-lost, and the linearised filter does not say how much.
+not accuracy. When nobody sees a soldier turn a corner, as when a gateway dies there, the heading is lost until
+satellites tell it; the linearised filter does not say how much.
 """
 
 

@@ -47,18 +47,22 @@ class Heard:
 def heard_by(scenario: str, seed: int, soldiers: int) -> Iterator[Heard]:
     """What the first soldiers of a scenario hear."""
     exercise = open_exercise(scenario, seed)
+    yield from (heard_in(exercise, soldier) for soldier in exercise.soldiers[:soldiers])
+
+
+def heard_in(exercise: Exercise, soldier: Soldier, duration_s: float | None = None) -> Heard:
+    """What a soldier of an exercise hears in its first ``duration_s`` (all of it, if None)."""
     begins_ns = exercise.begins_ns
-    end_ns = begins_ns + round(exercise.duration_s * NS_PER_S)
-    for soldier in exercise.soldiers[:soldiers]:
-        job = line_job(exercise, soldier, begins_ns, end_ns, False)
-        engine = EngineCore(job.pdr, job.identity, job.origin)
-        heard: list[tuple[int, Envelope]] = []
-        for envelope in run_messages(job.run, job.identity, begins_ns):
-            due = due_ns(envelope.message)
-            if due > end_ns:
-                break
-            heard.extend((due, one) for one in (envelope, *_steps(engine, envelope)) if _is_for_fusion(one))
-        yield Heard(exercise, soldier, job.identity, job.origin, job.fusion, tuple(heard))
+    end_ns = begins_ns + round((exercise.duration_s if duration_s is None else duration_s) * NS_PER_S)
+    job = line_job(exercise, soldier, begins_ns, end_ns, False)
+    engine = EngineCore(job.pdr, job.identity, job.origin)
+    heard: list[tuple[int, Envelope]] = []
+    for envelope in run_messages(job.run, job.identity, begins_ns):
+        due = due_ns(envelope.message)
+        if due > end_ns:
+            break
+        heard.extend((due, one) for one in (envelope, *_steps(engine, envelope)) if _is_for_fusion(one))
+    return Heard(exercise, soldier, job.identity, job.origin, job.fusion, tuple(heard))
 
 
 def _is_for_fusion(envelope: Envelope) -> bool:

@@ -15,9 +15,11 @@ from bootprint import logs
 from bootprint.bus import Envelope
 from bootprint.messages import Position
 from pdr_engine.foot import warm_up
+from proving_ground.evaluation import cooperation, door_heading, library_honesty, long_gap
 from proving_ground.evaluation.fusion_lines import Keep, everything, fused, heard_by, scored
 from proving_ground.evaluation.spoofing import Trial, figures, play
 from proving_ground.exercises.score import Row
+from proving_ground.scenario.loading import library
 
 _GAP_S = (120.0, 420.0)
 # Scenario, seed, soldiers: of every kind one.
@@ -93,9 +95,14 @@ def _shares(positions: Sequence[Position]) -> dict[str, float]:
     }
 
 
-def page(scenarios: Sequence[Played], spoofed: Mapping[str, Mapping[str, float]]) -> str:
-    """The whole document."""
-    tables = "\n\n".join(_scenario_section(one) for one in scenarios)
+def page(
+    scenarios: Sequence[Played],
+    spoofed: Mapping[str, Mapping[str, float]],
+    tables: Mapping[str, Sequence[str]],
+) -> str:
+    """The whole document; ``tables`` are those of the modules that measure them."""
+    left_out = "\n\n".join(_scenario_section(one) for one in scenarios)
+    told = {name: "\n".join(lines) for name, lines in tables.items()}
     return f"""# Fusion: what each source is worth
 
 Made by `make figures` (`python -m proving_ground.evaluation.fusion_page docs`). The same sensors are fused again
@@ -115,10 +122,46 @@ receivers was chosen, the others were not.
   that were learned beside the boots; a soldier without boots begins with them.
 - **Every position** says which source is left out and why (`rejections`), and how far the truth may be, even if
   something was wrong that no check would notice (`protection_m`).
+- **Speed and course** of a receiver are free of its position's slow errors. Beside what the boots walked between
+  two fixes they tell the heading within metres, and hold it to the door.
+- **Ranges to others of the squad** (`fusion.cooperation`) correct who is less sure than they are. A peer's place
+  may stem from the soldier's own, and errs alike from range to range, so it is never averaged in as news: along
+  the line between the two the soldier's error becomes the peer's where that is smaller, else nothing happens.
+  Peers must fit together before any is believed; three or more place a soldier who is lost or unplaced.
 
 ## Each source left out
 
-{tables}
+{left_out}
+
+## Heading at the door
+
+`python -m proving_ground.evaluation.door_heading`: no start, boots without compass and without poses between their
+steps, an honest receiver; odd seeds.
+
+{told["door"]}
+
+## Ranges between soldiers
+
+`python -m proving_ground.evaluation.cooperation`: five soldiers, real hubs and an emulated radio of 9600 bit/s
+between them; ranges once a second and peer, too long through walls. Figures are of the second and third minute. The
+trials ask for what ranges can mend (the third soldier) and for what they may spoil (the others). The lie shows a
+peer 40 m east of the truth, which in this wedge is nearly its mirror image: ranges alone do not refute it.
+
+{told["ranges"]}
+
+## Twenty minutes without satellites
+
+`python -m proving_ground.evaluation.long_gap`: mixed movement after two minutes of satellites; the largest error of
+the last minute.
+
+{told["gap"]}
+
+## Is the covariance honest?
+
+`python -m proving_ground.evaluation.library_honesty`: two soldiers of each scenario and seed, a quarter of an hour
+at most. Errors last for minutes, so a soldier's share says little by itself; their normalised square should be 2.
+
+{told["honesty"]}
 
 ## Slow spoofers
 
@@ -178,7 +221,19 @@ def main(docs: Path) -> None:
     warm_up()
     scenarios = [played(*one) for one in PLAYED]
     spoofed = {name: figures([play(trial) for trial in trials]) for name, trials in spoofing_trials()}
-    (docs / "fusion.md").write_text(page(scenarios, spoofed), encoding="utf-8")
+    (docs / "fusion.md").write_text(page(scenarios, spoofed, _tables()), encoding="utf-8")
+
+
+def _tables() -> dict[str, list[str]]:
+    """Measured by the modules that the page names."""
+    everybody = [one for name in library() for one in library_honesty.measure(name)]
+    squads = cooperation.measure(cooperation.SCENARIO, tuple(cooperation.TRIALS), cooperation.SEEDS)
+    return {
+        "door": door_heading.table(),
+        "ranges": cooperation.table(squads),
+        "gap": long_gap.table(long_gap.measure()),
+        "honesty": library_honesty.table(everybody),
+    }
 
 
 if __name__ == "__main__":

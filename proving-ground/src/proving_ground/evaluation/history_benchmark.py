@@ -210,9 +210,18 @@ def _ms(work: Callable[[], object], clock: Clock) -> float:
 
 
 def _size_bytes(url: str) -> int:
-    """Of a SQLite file, closed or open; a server's share of its disks is not measured."""
-    path = Path(url.removeprefix("sqlite:///"))
-    return sum(each.stat().st_size for each in path.parent.glob(f"{path.name}*"))
+    """Of a SQLite file, closed or open, or of the tables and indices on a server."""
+    if url.startswith("sqlite"):
+        path = Path(url.removeprefix("sqlite:///"))
+        return sum(each.stat().st_size for each in path.parent.glob(f"{path.name}*"))
+    from sqlalchemy import create_engine, text
+
+    sizes = " + ".join(f"pg_total_relation_size('{table}')" for table in ("archive", "address", "message"))
+    engine = create_engine(url)
+    with engine.connect() as connection:
+        size = int(connection.execute(text(f"SELECT {sizes}")).scalar_one())
+    engine.dispose()
+    return size
 
 
 def history(

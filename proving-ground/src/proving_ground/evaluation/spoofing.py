@@ -33,12 +33,12 @@ from proving_ground.sensors.places import Area
 
 ORIGIN = Origin(latitude_deg=59.6, longitude_deg=17.9, height_m=15.0)
 WHO = Identity("exercise", "alpha", "a1")
-_T0 = 1_700_000_000 * NS_PER_S
-_SPEED_M_S, _STRIDE_S = 1.3, 1.1
+T0 = 1_700_000_000 * NS_PER_S
+SPEED_M_S, _STRIDE_S = 1.3, 1.1
 _STEP_SIGMA = np.array([0.02, 0.015, 0.02, 0.002])  # a step's own: forward, left, up m, heading rad
 _SCALE_SIGMA, _SLOPE_SIGMA, _TURN_SIGMA_RAD_S = 0.0125, 0.0075, 3e-4
 _COMPASS_LASTS_RAD, _COMPASS_OF_PLACE_RAD = 0.1, 0.1
-_FEET = (("left_foot", 0.8, 0.12, 0.0), ("right_foot", -1.1, -0.12, 0.5))  # mounting rad, beside m, phase
+FEET = (("left_foot", 0.8, 0.12, 0.0), ("right_foot", -1.1, -0.12, 0.5))  # mounting rad, beside m, phase
 _EVERYWHERE = Area.disc((0.0, 0.0), 1e5, corners=8)
 _CLEAR_S = 1.0
 _GRID_M, _BEND_M = 0.25, 4.0  # points of a walk; over which a corner is turned
@@ -53,7 +53,7 @@ class Walk:
     @classmethod
     def drawn(cls, duration_s: float, rng: np.random.Generator) -> "Walk":
         """Legs of 25 to 90 m, turning by up to 120° between."""
-        count = int(duration_s * _SPEED_M_S / 25.0) + 2
+        count = int(duration_s * SPEED_M_S / 25.0) + 2
         lengths = rng.uniform(25.0, 90.0, count)
         headings = np.cumsum(rng.uniform(-2.1, 2.1, count))
         legs = np.repeat(headings, (lengths / _GRID_M).astype(np.int64))
@@ -63,13 +63,13 @@ class Walk:
 
     def place(self, time_s: FloatArray) -> FloatArray:
         """Where the body is (n, 2) m."""
-        gone = np.clip(time_s, 0.0, None) * _SPEED_M_S / _GRID_M
+        gone = np.clip(time_s, 0.0, None) * SPEED_M_S / _GRID_M
         grid = np.arange(len(self.points_m))
         return np.column_stack([np.interp(gone, grid, axis) for axis in self.points_m.T])
 
     def yaw(self, time_s: float) -> float:
         """Direction walked in, rad."""
-        (east, north), (east_on, north_on) = self.place(np.array([time_s, time_s + _GRID_M / _SPEED_M_S]))
+        (east, north), (east_on, north_on) = self.place(np.array([time_s, time_s + _GRID_M / SPEED_M_S]))
         return math.atan2(north_on - north, east_on - east)
 
     def at(self, time_s: FloatArray) -> tuple[FloatArray, Rotation]:
@@ -122,7 +122,7 @@ def play(trial: Trial) -> Outcome:
     """One walk; the same for the same trial."""
     rng = np.random.default_rng([trial.seed, 7])
     walk = Walk.drawn(trial.duration_s, rng)
-    envelopes = [*_steps(walk, trial, rng), *_fixes(walk, trial, rng)]
+    envelopes = [*steps_told(walk, trial, rng), *fixes_told(walk, trial, rng)]
     envelopes.sort(key=lambda envelope: (envelope.message.time_ns, envelope.address.key))
     heading_deg = math.degrees(0.5 * math.pi - walk.yaw(0.0))
     start = StartConfig(east_m=0.0, north_m=0.0, azimuth_deg=heading_deg, azimuth_sigma_deg=3.0)
@@ -136,7 +136,7 @@ def _positions(envelopes: Sequence[Envelope]) -> list[Position]:
 
 
 def _outcome(trial: Trial, walk: Walk, positions: Sequence[Position]) -> Outcome:
-    time_s = np.array([(position.time_ns - _T0) / NS_PER_S for position in positions])
+    time_s = np.array([(position.time_ns - T0) / NS_PER_S for position in positions])
     place = np.array([(position.east_m, position.north_m) for position in positions])
     miss = place - walk.place(time_s)
     spread = np.array([((c[0], c[1]), (c[1], c[3])) for c in (p.covariance_m2 for p in positions)])
@@ -146,12 +146,13 @@ def _outcome(trial: Trial, walk: Walk, positions: Sequence[Position]) -> Outcome
     return Outcome(trial, tuple(time_s[begun]), time_s, np.hypot(*miss.T), squared < 5.991)
 
 
-def _steps(walk: Walk, trial: Trial, rng: np.random.Generator) -> Iterator[Envelope]:
-    for place, mounting, beside, phase in _FEET:
+def steps_told(walk: Walk, trial: Trial, rng: np.random.Generator) -> Iterator[Envelope]:
+    """What both feet's engines say of the walk, as wrong as they say."""
+    for place, mounting, beside, phase in FEET:
         scale, slope = rng.normal(0.0, _SCALE_SIGMA), rng.normal(0.0, _SLOPE_SIGMA)
         turning, deviation = rng.normal(0.0, _TURN_SIGMA_RAD_S), rng.normal(0.0, _COMPASS_LASTS_RAD)
         times = np.arange(phase * _STRIDE_S, trial.duration_s, _STRIDE_S)
-        stances = [_stance(walk, time_s, mounting, beside) for time_s in times]
+        stances = [stance(walk, time_s, mounting, beside) for time_s in times]
         address = WHO.address("foot_step", place)
         for number, ((from_s, to_s), (start, end)) in enumerate(
             zip(itertools.pairwise(times), itertools.pairwise(stances), strict=True)
@@ -174,9 +175,9 @@ def _message(number: int, from_s: float, to_s: float, way: FloatArray, up: float
     covariance[2, 2] += (_SLOPE_SIGMA * across) ** 2
     covariance[3, 3] += (_TURN_SIGMA_RAD_S * (to_s - from_s)) ** 2
     return FootStep(
-        time_ns=_T0 + round(to_s * NS_PER_S),
+        time_ns=T0 + round(to_s * NS_PER_S),
         sequence=number,
-        start_time_ns=_T0 + round(from_s * NS_PER_S),
+        start_time_ns=T0 + round(from_s * NS_PER_S),
         displacement_m=(float(way[0]), float(way[1]), float(up)),
         heading_change_rad=turn,
         covariance=upper_triangle(covariance),
@@ -196,7 +197,7 @@ def _with_compass(step: FootStep, yaw: float) -> FootStep:
     )
 
 
-def _stance(walk: Walk, time_s: float, mounting: float, beside: float) -> FloatArray:
+def stance(walk: Walk, time_s: float, mounting: float, beside: float) -> FloatArray:
     """East, north of a foot's stance in the middle of which the body passes, and yaw of its step frame."""
     east, north = walk.place(np.array([time_s]))[0]
     yaw = walk.yaw(time_s)
@@ -208,7 +209,8 @@ def _turned(vector: FloatArray, yaw: float) -> FloatArray:
     return np.array([cosine * vector[0] - sine * vector[1], sine * vector[0] + cosine * vector[1]])
 
 
-def _fixes(walk: Walk, trial: Trial, rng: np.random.Generator) -> Iterator[Envelope]:
+def fixes_told(walk: Walk, trial: Trial, rng: np.random.Generator) -> Iterator[Envelope]:
+    """What the receiver says on the walk."""
     zones: tuple[Zone, ...] = ()
     if math.isfinite(trial.from_s):
         direction = float(rng.uniform(0.0, math.tau))
@@ -222,7 +224,7 @@ def _fixes(walk: Walk, trial: Trial, rng: np.random.Generator) -> Iterator[Envel
         yield Envelope(
             address,
             GnssFix(
-                time_ns=_T0 + round(float(series.time_s[row]) * NS_PER_S),
+                time_ns=T0 + round(float(series.time_s[row]) * NS_PER_S),
                 sequence=number,
                 fix_kind="3d",
                 latitude_deg=float(series.lat_deg[row]),
@@ -231,8 +233,14 @@ def _fixes(walk: Walk, trial: Trial, rng: np.random.Generator) -> Iterator[Envel
                 horizontal_accuracy_m=float(series.h_acc_m[row]),
                 vertical_accuracy_m=float(series.v_acc_m[row]),
                 satellites=int(series.satellites[row]),
+                speed_m_s=float(series.speed_m_s[row]),
+                course_rad=_course_rad(float(series.course_deg[row])),
             ),
         )
+
+
+def _course_rad(course_deg: float) -> float | None:
+    return None if math.isnan(course_deg) else math.radians(course_deg) % math.tau
 
 
 def figures(outcomes: Sequence[Outcome]) -> dict[str, float]:

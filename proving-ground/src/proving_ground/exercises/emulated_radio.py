@@ -73,6 +73,15 @@ class NetCounts:
     lost: int = 0
 
 
+@dataclass(frozen=True)
+class Parting:
+    """Between two times (s) those ``apart`` hear each other only, and so do all others."""
+
+    apart: frozenset[str]
+    begin_s: float
+    end_s: float
+
+
 @dataclass(order=True)
 class Delivery:
     """A datagram that is to reach a member when event time is ``due_s``."""
@@ -86,7 +95,7 @@ class Delivery:
 class Air:
     """A net in event time, s. ``silences_s``: (member, or "" for the whole net; from, until) when nothing passes.
 
-    Silences count from the exercise's zero, which stands at ``zero_s``; until that is set there are none.
+    Silences and ``partings`` count from the exercise's zero, at ``zero_s``; until that is set there are none.
     """
 
     def __init__(
@@ -95,8 +104,10 @@ class Air:
         members: Sequence[str],
         silences_s: Sequence[tuple[str, float, float]] = (),
         zero_s: float = math.inf,
+        partings: Sequence[Parting] = (),
     ) -> None:
         self.profile = profile
+        self._partings = tuple(partings)
         self._medium = profile.medium
         self.counts = NetCounts()
         self.zero_s = zero_s
@@ -119,7 +130,7 @@ class Air:
                 continue
             # Drawn for everybody, so that an outage does not shift what others lose afterwards.
             missed = self._random.random() < self.profile.loss
-            if missed or not deaf.isdisjoint(("", sender, member)):
+            if missed or not deaf.isdisjoint(("", sender, member)) or self._parted(sender, member, now_s):
                 self.counts.lost += 1
             else:
                 turn = self.counts.datagrams * len(self._members) + order
@@ -128,6 +139,13 @@ class Air:
     def _silent(self, now_s: float) -> set[str]:
         at_s = now_s - self.zero_s
         return {who for who, begin, end in self._silences_s if begin <= at_s < end}
+
+    def _parted(self, sender: str, member: str, now_s: float) -> bool:
+        at_s = now_s - self.zero_s
+        return any(
+            one.begin_s <= at_s < one.end_s and (sender in one.apart) != (member in one.apart)
+            for one in self._partings
+        )
 
     @property
     def next_due_s(self) -> float:
@@ -152,9 +170,10 @@ class EmulatedNet:
         member_ports: Mapping[str, int],
         speed: float = 1.0,
         silences_s: Sequence[tuple[str, float, float]] = (),
+        partings: Sequence[Parting] = (),
     ) -> None:
         self.profile = profile
-        self._air = Air(profile, list(member_ports), silences_s)
+        self._air = Air(profile, list(member_ports), silences_s, partings=partings)
         self._ports = dict(member_ports)
         self._names = {port: name for name, port in member_ports.items()}
         self._speed = speed

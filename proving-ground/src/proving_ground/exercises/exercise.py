@@ -14,7 +14,7 @@ import numpy.typing as npt
 from bootprint.clock import NS_PER_S
 from bootprint.config import Member, Origin, Realm
 from bootprint.topics import Identity
-from proving_ground.exercises.emulated_radio import NetProfile
+from proving_ground.exercises.emulated_radio import NetProfile, Parting
 from sensor_gateway.recordings.run import Run, Truth
 
 FloatArray = npt.NDArray[np.float64]
@@ -200,3 +200,11 @@ class Exercise:
             elif fault.kind == "radio_gone" and fault.target in net.members:
                 down.append((fault.target, fault.at_s, fault.until_s))
         return sorted(down, key=lambda silence: (silence[1], silence[0]))
+
+    def partings(self, net: Net) -> list[Parting]:
+        """When a net is in two parts."""
+        return [
+            Parting(frozenset(fault.details["apart"]), fault.at_s, fault.until_s)
+            for fault in self.faults
+            if fault.kind == "net_parted" and fault.target == net.profile.name
+        ]

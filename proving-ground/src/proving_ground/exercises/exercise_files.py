@@ -83,6 +83,7 @@ def write_gateway(
         "path": str(soldier.run.path.resolve()),
         "run": soldier.run.name,
         "start_time_s": start_ns / NS_PER_S,
+        "skip_past": True,  # should the gateway be killed
     }
     write_toml(
         folder / soldier.id / "gateway.toml",

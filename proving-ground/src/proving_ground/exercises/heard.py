@@ -18,6 +18,7 @@ from bootprint.messages import FootStep, Health, LinkReport, Position, Track
 FloatArray = npt.NDArray[np.float64]
 WATCHED = ("foot_step", "position", "track", "link", "health")
 _COLUMNS = 8
+_MEMORY_EVERY_NS = 10 * NS_PER_S
 _UNKNOWN = Held(math.nan, math.nan)
 
 
@@ -78,7 +79,7 @@ class Heard:
     """What one computer's bus has told so far. ``newest`` are the newest tracks, ``reports`` those of others.
 
     ``sent`` holds (time ns, bytes on the air so far) of every link; ``latency_s`` is host time from the event time
-    of the soldier's own position to its publication as a track.
+    of the soldier's own position to its publication as a track; ``memory_mb`` (time ns, health's number, MB).
     """
 
     positions: list[Position] = field(default_factory=list)
@@ -89,6 +90,7 @@ class Heard:
     sent: dict[str, list[tuple[int, int]]] = field(default_factory=lambda: defaultdict(list))
     health: dict[str, Health] = field(default_factory=dict)
     latency_s: list[float] = field(default_factory=list)
+    memory_mb: dict[str, list[tuple[int, int, float]]] = field(default_factory=lambda: defaultdict(list))
 
     def take(self, envelope: Envelope, arrived_ns: int, frame: LocalFrame) -> bool:
         """Keep what a message says; whether it is a new report of the computer's own soldier."""
@@ -104,7 +106,14 @@ class Heard:
                 self.sent[report.link].append((report.time_ns, report.bytes_sent))
             case Health() as health:
                 self.health[health.service] = health
+                self._take_memory(health)
         return False
+
+    def _take_memory(self, health: Health) -> None:
+        samples, size_mb = self.memory_mb[health.service], health.gauges.get("memory_mb")
+        young = samples and health.time_ns - samples[-1][0] < _MEMORY_EVERY_NS
+        if size_mb is not None and not (young and health.sequence > samples[-1][1]):
+            samples.append((health.time_ns, health.sequence, size_mb))
 
     def _take_track(self, track: Track, computer: str, arrived_ns: int, frame: LocalFrame) -> bool:
         previous = self.newest.get(track.soldier)

@@ -14,7 +14,7 @@ from bootprint.recording import Recorder
 from pdr_engine.foot import warm_up
 from proving_ground.exercises.exercise import Exercise, Soldier
 from proving_ground.exercises.exercise_files import check_exercise, soldier_settings
-from proving_ground.exercises.line import Line, LineJob, play_line
+from proving_ground.exercises.line import Line, LineJob, back_after_ns, killed_by, play_line
 from proving_ground.exercises.radio_play import RadioPlay
 from proving_ground.exercises.result import Played
 from proving_ground.exercises.sensor_faults import with_faults
@@ -65,9 +65,11 @@ def line_job(exercise: Exercise, soldier: Soldier, start_ns: int, end_ns: int, r
     """What a soldier's line needs, sensor faults done to the run and kills noted."""
     pdr, fusion = soldier_settings(exercise, soldier)
     kills = tuple(
-        (start_ns + round(fault.at_s * NS_PER_S), str(fault.details["process"]))
+        (begin_ns, begin_ns + back_after_ns(fault), service)
         for fault in exercise.faults
-        if fault.kind == "process_killed" and fault.target == soldier.id
+        if fault.target == soldier.id
+        for begin_ns in (start_ns + round(fault.at_s * NS_PER_S),)
+        for service in killed_by(fault)
     )
     return LineJob(
         identity=exercise.identity(soldier.id),

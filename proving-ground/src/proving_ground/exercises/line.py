@@ -14,28 +14,44 @@ from bootprint.bus import Core, Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.config import Origin
 from bootprint.messages import FootStep, Position
-from bootprint.topics import Address, Identity, Qos
+from bootprint.topics import CACHED_SAMPLES, Address, Identity, Qos
 from fusion.config import FusionConfig
 from fusion.engine import SUBJECTS as FUSION_SUBJECTS
 from fusion.engine import FusionCore
-from fusion.memory import SAVE_EVERY_NS, Saved
+from fusion.memory import SAVE_EVERY_NS
+from fusion.memory import Saved as SavedFusion
 from pdr_engine.config import PdrConfig
 from pdr_engine.engine import SUBJECTS as PDR_SUBJECTS
 from pdr_engine.engine import EngineCore
+from pdr_engine.memory import Saved as SavedEngine
+from proving_ground.exercises.exercise import Fault
 from sensor_gateway.recordings.run import Run
 from sensor_gateway.sources.run_messages import run_messages
 from sensor_gateway.stamps import due_ns
 
 TICK_NS: Final = 100_000_000
 RESTART_NS: Final = 2 * NS_PER_S
-"""A process that was killed is back after so long, as its supervisor has it; a replaying gateway is not."""
-_CACHED = 64  # events that a process started later is told, as the bus's caches do
+"""A process that was killed is back after so long, as its supervisor has it."""
+SOLDIERS_SERVICES: Final = ("sensor-gateway", "pdr-engine", "fusion", "sa-hub")
+_TOLD_AGAIN: Final = (Qos.ASSURED, Qos.RECENT)  # what a process that is started later is told, as by the bus
 _SERVICES: Final = {"pdr-engine": PDR_SUBJECTS, "fusion": FUSION_SUBJECTS}
+
+
+def killed_by(fault: Fault) -> tuple[str, ...]:
+    """The services of its computer that a fault takes away."""
+    if fault.kind == "power_cut":
+        return SOLDIERS_SERVICES
+    return (str(fault.details["process"]),) if fault.kind == "process_killed" else ()
+
+
+def back_after_ns(fault: Fault) -> int:
+    """After how long they are back."""
+    return RESTART_NS if fault.kind == "process_killed" else round((fault.until_s - fault.at_s) * NS_PER_S)
 
 
 @dataclass(frozen=True)
 class LineJob:
-    """Everything a line needs, for any process. ``kills`` are (time UTC ns, service) of processes killed."""
+    """Everything a line needs, for any process. ``kills`` are (UTC ns from, until; service) when one is gone."""
 
     identity: Identity
     origin: Origin
@@ -44,7 +60,7 @@ class LineJob:
     fusion: FusionConfig
     start_ns: int
     end_ns: int
-    kills: tuple[tuple[int, str], ...] = ()
+    kills: tuple[tuple[int, int, str], ...] = ()
     record: bool = False
 
 
@@ -69,7 +85,8 @@ class _Player:
     def __init__(self, job: LineJob) -> None:
         self._job = job
         self._line = Line(job.identity.soldier)
-        self._saved: Saved | None = None  # what fusion has on its disk
+        self._fusion_saved: SavedFusion | None = None  # what each has on its disk
+        self._engine_saved: SavedEngine | None = None
         self._cores: dict[str, Core | None] = {name: self._build(name) for name in _SERVICES}
         self._cache: dict[Address, deque[Envelope]] = {}
         self._now_ns = job.start_ns
@@ -80,15 +97,14 @@ class _Player:
     def _build(self, service: str) -> Core:
         job = self._job
         if service == "fusion":
-            return FusionCore(job.fusion, job.identity, job.origin, saved=self._saved)
-        return EngineCore(job.pdr, job.identity, job.origin)
+            return FusionCore(job.fusion, job.identity, job.origin, saved=self._fusion_saved)
+        return EngineCore(job.pdr, job.identity, job.origin, saved=self._engine_saved)
 
     def _changes(self) -> Iterator[tuple[int, str, bool]]:
         """(time, service, runs from then on)."""
-        for at_ns, service in self._job.kills:
-            yield at_ns, service, False
-            if service in _SERVICES:
-                yield at_ns + RESTART_NS, service, True
+        for begin_ns, end_ns, service in self._job.kills:
+            yield begin_ns, service, False
+            yield end_ns, service, True
 
     def play(self) -> Line:
         """All of it, until the exercise's end."""
@@ -117,9 +133,13 @@ class _Player:
         self._now_ns = max(self._now_ns, until_ns)
 
     def _save(self) -> None:
-        fusion = self._cores["fusion"]
-        if isinstance(fusion, FusionCore) and self._job.kills and self._now_ns % SAVE_EVERY_NS < TICK_NS:
-            self._saved = fusion.remembered()
+        if not self._job.kills or self._now_ns % SAVE_EVERY_NS >= TICK_NS:
+            return
+        fusion, engine = self._cores["fusion"], self._cores["pdr-engine"]
+        if isinstance(fusion, FusionCore):
+            self._fusion_saved = fusion.remembered() or self._fusion_saved
+        if isinstance(engine, EngineCore):
+            self._engine_saved = engine.remembered() or self._engine_saved
 
     def _change(self, until_ns: int) -> None:
         while self._schedule and self._schedule[0][0] <= until_ns:
@@ -157,8 +177,9 @@ class _Player:
 
     def _keep(self, envelope: Envelope) -> None:
         address, message = envelope.address, envelope.message
-        if self._job.kills and address.topic.qos is Qos.ASSURED:
-            self._cache.setdefault(address, deque(maxlen=_CACHED)).append(envelope)
+        qos = address.topic.qos
+        if self._job.kills and qos in _TOLD_AGAIN:
+            self._cache.setdefault(address, deque(maxlen=CACHED_SAMPLES[qos])).append(envelope)
         if isinstance(message, Position):
             self._line.positions.append((self._now_ns, message))
         elif isinstance(message, FootStep):

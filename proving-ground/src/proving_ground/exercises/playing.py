@@ -29,6 +29,7 @@ _REFRESH_S = 0.5
 class Playing:
     """How an exercise is to be played and shown; ``duration_s`` None is until the last walk has ended.
 
+    ``storm``: the seed of faults of every kind at random.
     ``page_port``: where the command post's page is wanted, 0 for anywhere; None is for no page.
     """
 
@@ -40,6 +41,7 @@ class Playing:
     serial: bool = False
     record: Path | None = None
     workers: int = 0
+    storm: int | None = None
     page_port: int | None = None
 
     @property
@@ -66,11 +68,14 @@ def prepare(scenario: str, seed: int, how: Playing) -> "Exercise":
     """The exercise of a scenario and a seed, built on the local processors; ConfigError if it is wrong."""
     from proving_ground.exercises.run_files import with_files, without_samples
     from proving_ground.exercises.source import open_exercise
+    from proving_ground.exercises.storm import with_storm
 
     with progress_bars() as show:
         exercise = open_exercise(
             scenario, seed, workers=how.local_workers, on_progress=lambda share: show("sensors", share)
         )
+    if how.storm is not None:
+        exercise = with_storm(exercise, how.storm, how.duration_s)
     if how.mode == "inprocess":
         return exercise
     staged = with_files(exercise, how.report)
@@ -217,7 +222,8 @@ class Runner:
             "latency_p99_ms": latency_p99_ms(list(heard.values())),
             "usage": self._usage,
         }
-        return result_of(Played(stage.exercise, stage.start_ns, duration_s, heard, nets), extra)
+        played = Played(stage.exercise, stage.start_ns, duration_s, heard, nets, tuple(stage.outages))
+        return result_of(played, extra)
 
     def _going(self) -> bool:
         from proving_ground.exercises.usage import UsageMeter

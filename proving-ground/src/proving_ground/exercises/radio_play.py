@@ -20,7 +20,7 @@ from proving_ground.exercises.emulated_radio import Air
 from proving_ground.exercises.exercise import Exercise
 from proving_ground.exercises.exercise_files import hub_settings
 from proving_ground.exercises.heard import Heard
-from proving_ground.exercises.line import RESTART_NS, Line
+from proving_ground.exercises.line import Line, back_after_ns, killed_by
 from sa_hub.assembly import build_hub
 from sa_hub.hub import STEP_NS, HubCore
 from sa_hub.radio.counters import MemoryCounters
@@ -72,7 +72,9 @@ class RadioPlay:
         self._hubs: dict[str, HubCore | None] = {name: self._build(name) for name in exercise.computers}
         self._identities = {name: exercise.identity(name) for name in exercise.computers}
         self._airs = {
-            net.profile.name: Air(net.profile, net.members, exercise.silences_s(net), zero_s=0.0)
+            net.profile.name: Air(
+                net.profile, net.members, exercise.silences_s(net), 0.0, exercise.partings(net)
+            )
             for net in exercise.nets
         }
         self.heard = {name: self._heard(lines.get(name)) for name in exercise.computers}
@@ -108,10 +110,10 @@ class RadioPlay:
     def _hub_changes(self) -> Iterator[tuple[int, str, bool]]:
         """(time, computer, hub runs from then on) of hubs that are killed."""
         for fault in self._exercise.faults:
-            if fault.kind == "process_killed" and fault.details.get("process") == "sa-hub":
+            if "sa-hub" in killed_by(fault):
                 at_ns = self._start_ns + round(fault.at_s * NS_PER_S)
                 yield at_ns, fault.target, False
-                yield at_ns + RESTART_NS, fault.target, True
+                yield at_ns + back_after_ns(fault), fault.target, True
 
     def run(self, on_progress: Callable[[float], None] = lambda _share: None) -> None:
         """Play it; ``on_progress`` is told the share that is done, now and then."""
@@ -183,8 +185,9 @@ class RadioPlay:
 
     def _clock_ns(self, computer: str, now_ns: int) -> int:
         """What a computer takes for the time."""
+        true_ns = now_ns
         for fault in self._clock_jumps:
-            if fault.target == computer and self._seconds(now_ns) >= fault.at_s:
+            if fault.target == computer and fault.at_s <= self._seconds(true_ns) < fault.until_s:
                 now_ns += round(float(fault.details["jump_s"]) * NS_PER_S)
         return now_ns
 

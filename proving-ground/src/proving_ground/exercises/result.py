@@ -10,7 +10,10 @@ from proving_ground.exercises.events import Event, event_log
 from proving_ground.exercises.exercise import Exercise
 from proving_ground.exercises.exercise_files import hub_settings
 from proving_ground.exercises.heard import Heard
+from proving_ground.exercises.memory_growth import memory_growth
 from proving_ground.exercises.picture import Ages, Picture, picture_row, sample_picture
+from proving_ground.exercises.process_faults import Outage
+from proving_ground.exercises.recovery import fault_rows, storm_summary
 from proving_ground.exercises.score import Compared, Row, compare, link_row, soldier_row
 
 
@@ -23,6 +26,7 @@ class Played:
     duration_s: float
     heard: Mapping[str, Heard]
     nets: Mapping[str, NetCounts]
+    outages: tuple[Outage, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,8 +64,20 @@ def result_of(played: Played, extra: Mapping[str, Any] | None = None) -> Result:
         "links": _links(played),
         "nets": [_net_row(name, counts, played.duration_s) for name, counts in played.nets.items()],
         "events": [asdict(event) for event in events],
+        **_faults(played, ages.stale_s),
     }
     return Result(figures, played, compared, pictures, events)
+
+
+def _faults(played: Played, stale_s: float) -> dict[str, Any]:
+    """What became of the faults, if there were any."""
+    if not played.exercise.faults:
+        return {}
+    rows = fault_rows(
+        played.exercise, played.heard, played.outages, played.start_ns, played.duration_s, stale_s
+    )
+    growth = memory_growth(played.heard)
+    return {"faults": rows, "faults_summary": storm_summary(rows, played.outages) | growth}
 
 
 def ages_of(exercise: Exercise) -> Ages:

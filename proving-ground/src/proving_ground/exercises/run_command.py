@@ -65,6 +65,9 @@ def run(
     headless: Annotated[bool, typer.Option("--headless", help="No live table; a line now and then.")] = False,
     page: Page = None,
     workers: Workers = 0,
+    storm: Annotated[
+        int | None, typer.Option(metavar="SEED", help="Faults of every kind at random, one after the other.")
+    ] = None,
     json_out: Json = None,
 ) -> None:
     """Play a scenario and score it at every hop.
@@ -91,6 +94,7 @@ def run(
         serial=serial is not None,
         record=record,
         workers=workers,
+        storm=storm,
         page_port=page_port(page, headless=headless),
     )
     outcome = play(with_settings(prepare(scenario, seed, how), settings), how)

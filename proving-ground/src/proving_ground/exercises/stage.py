@@ -5,7 +5,6 @@ come over the air. As many processes are starting at a time as the machine's pro
 """
 
 import os
-import random
 import socket
 import time
 from collections import deque
@@ -13,7 +12,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
-from itertools import chain, islice
 from pathlib import Path
 from types import TracebackType
 
@@ -36,13 +34,14 @@ from proving_ground.exercises.exercise_files import (
     write_plan,
     write_realm,
 )
+from proving_ground.exercises.free_ports import free_ports, is_free
 from proving_ground.exercises.observer import Observers
-from proving_ground.exercises.process_faults import ProcessFaults
+from proving_ground.exercises.process_faults import Outage, ProcessFaults
 from proving_ground.exercises.run_files import with_files
 from proving_ground.exercises.serial_feed import SerialFeed
 from proving_ground.exercises.truth_record import record_truth
 
-GATEWAY = "sensor-gateway"
+GATEWAY, HUB = "sensor-gateway", "sa-hub"
 SOLDIER_SERVICES = ("pdr-engine", "fusion", "sa-hub")
 POST_SERVICES = ("sa-hub",)
 _READY_TIMEOUT_S = 120.0  # for one process
@@ -51,7 +50,6 @@ _BUSY_BEATS_S = ((15, 0.2), (6, 0.1))  # from so many computers on each processo
 # Host seconds for the gateways to start before the walks do: a base, each one's imports, each second of a unit.
 _LEAD_S, _LEAD_PER_GATEWAY_S, _LEAD_PER_PLAYED_S = 5.0, 1.0, 2e-4
 _LEAD_TRIES = (1.0, 3.0, 9.0)
-_OWN_PORTS = (10_000, 32_000)
 _LAST_CALL_S = 3.0  # host seconds before the walks: who is not there then will not be
 
 OnProgress = Callable[[int, int], None]
@@ -100,6 +98,8 @@ class Stage:
         self._recorder: Recorder | None = None
         self._serial: SerialFeed | None = None
         self._faults = ProcessFaults(self)
+        self.jumps_s: dict[str, float] = {}
+        """By how much the clocks of hubs are off, by computer; for those that are started from now on."""
 
     def __enter__(self) -> "Stage":
         try:
@@ -150,6 +150,10 @@ class Stage:
         """A router at the same address again."""
         self._routers[computer] = EmbeddedRouter(self._endpoints[computer])
 
+    def endpoint(self, computer: str) -> str:
+        """The address of a computer's router."""
+        return self._endpoints[computer]
+
     def _start_nets(self) -> Ports:
         nets = self.exercise.nets
         numbers = iter(free_ports(sum(len(net.members) for net in nets), socket.SOCK_DGRAM))
@@ -158,7 +162,11 @@ class Stage:
             name = net.profile.name
             ports.members[name] = {member: next(numbers) for member in net.members}
             emulated = EmulatedNet(
-                net.profile, ports.members[name], self.speed, self.exercise.silences_s(net)
+                net.profile,
+                ports.members[name],
+                self.speed,
+                self.exercise.silences_s(net),
+                self.exercise.partings(net),
             )
             emulated.start()
             self._stack.callback(emulated.close)
@@ -173,9 +181,7 @@ class Stage:
         if wanted is None or self.exercise.hub_role(self.exercise.command_post) != COMMAND_POST_ROLE:
             return None
         port = (
-            wanted
-            if wanted and _is_free(wanted, socket.SOCK_STREAM)
-            else free_ports(1, socket.SOCK_STREAM)[0]
+            wanted if wanted and is_free(wanted, socket.SOCK_STREAM) else free_ports(1, socket.SOCK_STREAM)[0]
         )
         self.page_address = f"http://127.0.0.1:{port}/"
         return port
@@ -188,6 +194,11 @@ class Stage:
         return sum(len(self._services(computer)) for computer in self.exercise.computers) + len(
             self.exercise.soldiers
         )
+
+    def services_of(self, computer: str) -> tuple[str, ...]:
+        """All services of a computer, its gateway last."""
+        soldiers = {soldier.id for soldier in self.exercise.soldiers}
+        return (*self._services(computer), *((GATEWAY,) if computer in soldiers else ()))
 
     def _services(self, computer: str) -> tuple[str, ...]:
         posts = {hub.id for hub in self.exercise.hubs}
@@ -206,12 +217,18 @@ class Stage:
                     *("--config", str(folder / config)),
                     *("--speed", str(self._play.speed)),
                     *("--clock-origin", f"{self._origin_s:.6f}"),
+                    *("--clock-offset", f"{self._clock_off_s(computer, service):g}"),
                     *("--router-wait", "30"),
                     *("--beat", f"{self._beat_s():.3f}"),
                 ),
                 log=folder / f"{service}.log",
+                append=True,
             )
         )
+
+    def _clock_off_s(self, computer: str, service: str) -> float:
+        """By how many host seconds a process's clock is off."""
+        return self.jumps_s.get(computer, 0.0) / self._play.speed if service == HUB else 0.0
 
     def _beat_s(self) -> float:
         """As often as one soldier's computer looks at its bus, if the machine has the processors for it."""
@@ -296,8 +313,14 @@ class Stage:
         """Do what is to break by now, and mend what was broken long enough."""
         self._faults.play(self.elapsed_s)
 
+    @property
+    def outages(self) -> list[Outage]:
+        """Who was gone for how long, by faults of processes."""
+        return self._faults.outages
+
     def end(self) -> None:
         """The exercise is over: take in what has been said, let everybody go, and record the truth beside it."""
+        self._faults.close()
         self.observers.close()
         self.processes.stop()  # before the scoring, which wants the processors
         if self._recorder is not None:
@@ -319,26 +342,3 @@ def _lead_s(soldiers: Sequence[Soldier]) -> float:
     played_s = sum(soldier.run.duration_s * len(soldier.run.imus) for soldier in soldiers)
     work_s = _LEAD_PER_GATEWAY_S * len(soldiers) + _LEAD_PER_PLAYED_S * played_s
     return _LEAD_S + work_s / (os.cpu_count() or 1)
-
-
-def free_ports(count: int, kind: socket.SocketKind) -> list[int]:
-    """Ports that are free on loopback now, of those that the system gives to nobody who only asks for any.
-
-    A port from the system's own range could go to the next socket that asks before its process has come to bind it.
-    """
-    first = random.SystemRandom().randrange(*_OWN_PORTS)
-    free = (
-        port
-        for port in chain(range(first, _OWN_PORTS[1]), range(_OWN_PORTS[0], first))
-        if _is_free(port, kind)
-    )
-    return list(islice(free, count))
-
-
-def _is_free(port: int, kind: socket.SocketKind) -> bool:
-    with socket.socket(socket.AF_INET, kind) as probe:
-        try:
-            probe.bind(("127.0.0.1", port))
-        except OSError:
-            return False
-    return True

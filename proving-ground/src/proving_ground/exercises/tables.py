@@ -40,6 +40,9 @@ def print_scores(result: Result) -> None:
         if len(rows) > _SHORT_ROWS:
             rows, title = summary(rows), f"{title}: {len(rows)} rows, in short"
         console.print(_terminal_table(rows, title))
+    if "faults" in result.figures:
+        console.print(_terminal_table(result.figures["faults"], "Faults, and what became of them"))
+        console.print(_terminal_table([result.figures["faults_summary"]], "All faults"))
     if "usage" in result.figures:
         console.print(_terminal_table(by_service(result.figures["usage"]), "Processes"))
         latency = cell(result.figures["latency_p99_ms"])

@@ -41,6 +41,14 @@ def loadtest(
     feedback: Annotated[
         bool, typer.Option(help="Receivers report, too, and so tell what they heard; else they are silent.")
     ] = True,
+    posts: Annotated[
+        bool,
+        typer.Option("--posts", help="Receivers have no place of their own: they tell only what they heard."),
+    ] = False,
+    foreseen: Annotated[
+        bool,
+        typer.Option("--foreseen/--unforeseen", help="The sender's settings say how many frames are lost."),
+    ] = True,
     data: Data = None,
     json_out: Json = None,
 ) -> None:
@@ -68,6 +76,8 @@ def loadtest(
         link=link,
         tracks=tracks,
         feedback=feedback,
+        posts=posts,
+        foreseen=foreseen,
         duration_s=duration,
         data=data,
     )
@@ -96,7 +106,7 @@ def sweep(
         typer.Option(
             "--set",
             metavar="KEY=VALUE,…",
-            help="soldiers, bitrate, loss, tag, link, feedback, duration_s, format. May be repeated.",
+            help="soldiers, bitrate, loss, tag, link, feedback, posts, foreseen, duration_s, format. Repeatable.",
         ),
     ] = None,
     workers: Annotated[

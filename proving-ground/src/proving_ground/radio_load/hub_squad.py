@@ -2,7 +2,8 @@
 
 The sender is a squad leader's hub. Everybody's positions come to it as fusions tell them, five times a second,
 whole, as over broadband nets inside the squad; only what it says on the narrow link is measured.
-Receivers are independent hubs. With feedback they walk, too, and report themselves on the same link.
+Receivers are independent hubs. With feedback they walk, too, and report themselves on the same link, or they are
+command posts that tell only what they heard.
 """
 
 import hashlib
@@ -72,11 +73,14 @@ class HubSquad:
         self._indices = {name: index for index, name in enumerate(soldiers)}
         self._sender = self._hub(_SENDER, "squad_leader", load.hub_link)
         receivers_link = load.receivers_link
+        role: Role = "command_post" if load.posts else "soldier"
         self._receivers = {
-            name: self._hub(name, "soldier", receivers_link or load.hub_link) for name in load.receivers
+            name: self._hub(name, role, receivers_link or load.hub_link) for name in load.receivers
         }
+        self._speaking = {} if receivers_link is None else self._receivers
         self._squad_feed = _Feed(tracks, 1)
-        self._receivers_feed = _Feed(load.receivers_tracks(), load.soldiers + 1) if receivers_link else None
+        walking = receivers_link is not None and not load.posts
+        self._receivers_feed = _Feed(load.receivers_tracks(), load.soldiers + 1) if walking else None
         self._air = SharedLink(load, [_SENDER, *load.receivers])
         self._seen: dict[tuple[str, int], Seen] = defaultdict(Seen)
         self._frame = LocalFrame(ORIGIN)
@@ -99,9 +103,8 @@ class HubSquad:
             self._deliver(now_ns)
             self._feed(count)
             self._speak(_SENDER, self._sender, now_ns)
-            if self._receivers_feed is not None:
-                for name, hub in self._receivers.items():
-                    self._speak(name, hub, now_ns)
+            for name, hub in self._speaking.items():
+                self._speak(name, hub, now_ns)
             if count % 500 == 0:
                 on_progress(count / len(steps))
         return self._outcome()

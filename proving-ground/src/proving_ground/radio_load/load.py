@@ -38,7 +38,11 @@ TagBytes = Literal[8, 4]
 
 @dataclass(frozen=True)
 class Load:
-    """One load test. ``bitrate`` is the squad's budget on the ``link``; ``feedback``: receivers report, too."""
+    """One load test. ``bitrate`` is the squad's budget on the ``link``; ``feedback``: receivers speak, too.
+
+    They report themselves, or, ``posts``, have no place of their own and tell nothing but what they heard.
+    ``foreseen``: the sender's settings say how many frames are lost.
+    """
 
     soldiers: int = 12
     bitrate: int = 34
@@ -48,6 +52,8 @@ class Load:
     tracks: str = "patrol"
     seed: int = 1
     feedback: bool = True
+    posts: bool = False
+    foreseen: bool = True
     duration_s: float = LONGEST_S
     data: Path | None = None
 
@@ -71,7 +77,7 @@ class Load:
 
     @cached_property
     def receivers_link(self) -> LinkProfile | None:
-        """The same for a receiver that reports, too: as much as the sender, if the radio has that left; None
+        """The same for a receiver that speaks, too: as much as the sender, if the radio has that left; None
         without feedback, or where the radio has hardly anything left."""
         left = int(_SHARED_OUT * self.medium.rate_bits_per_s) - self.bitrate
         rate = min(self.bitrate, left // len(self.receivers))
@@ -84,7 +90,7 @@ class Load:
                 name=NET,
                 profile=self.link,
                 rate_bits_per_s=rate_bits_per_s,
-                expected_loss=min(self.loss, _MOST_EXPECTED),
+                expected_loss=min(self.loss, _MOST_EXPECTED) if self.foreseen else 0.0,
             )
         except ValueError as error:
             raise ConfigError(f"--link {self.link} --bitrate {self.bitrate}: {error}") from error

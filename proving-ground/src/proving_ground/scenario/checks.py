@@ -4,9 +4,9 @@ from collections.abc import Collection
 
 from proving_ground.scenario.cast import Cast
 from proving_ground.scenario.faulty import ScenarioFault
+from proving_ground.scenario.schema.faults import Fault, NetParted, RadioGone, SensorFault
 from proving_ground.scenario.schema.people import Kit
 from proving_ground.scenario.schema.scenario import ScenarioFile
-from proving_ground.scenario.schema.world import Fault, RadioGone, SensorFault
 from proving_ground.scenario.site import OUTSIDE, Site
 from proving_ground.scenario.site_builder import known
 
@@ -38,11 +38,17 @@ def _check_fault(fault: Fault, cast: Cast, key: str) -> None:
     targets = set(kits)
     if not isinstance(fault, SensorFault):
         targets |= {post.id for post in cast.posts}
+    nets = {name: members for name, _, members in cast.nets}
     if isinstance(fault, RadioGone):
-        targets |= {name for name, _, _ in cast.nets}
+        targets |= set(nets)
+    if isinstance(fault, NetParted):
+        targets = set(nets)
     known(fault.target, targets, f"{key}.target", "soldier" if isinstance(fault, SensorFault) else "target")
     if isinstance(fault, SensorFault):
         known(fault.sensor, sensors_of(kits[fault.target]), f"{key}.sensor", f"sensor of {fault.target}")
+    if isinstance(fault, NetParted):
+        for member in fault.apart:
+            known(member, nets[fault.target], f"{key}.apart", f"member of {fault.target}")
 
 
 def sensors_of(kit: Kit) -> list[str]:

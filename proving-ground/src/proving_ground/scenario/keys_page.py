@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 from msgspec import inspect
 
-from proving_ground.scenario.schema import people, site, tasks, world
+from proving_ground.scenario.schema import faults, people, site, tasks, world
 from proving_ground.scenario.schema.scenario import ScenarioFile
 
 BEGIN, END = "<!-- keys: generated -->\n", "<!-- keys: end -->\n"
@@ -40,7 +40,7 @@ _TAGGED: tuple[tuple[str, str, str, type, tuple[Any, ...]], ...] = (
     ("Tasks", "do", "Every task has", tasks.TaskTable, tasks.Task.__args__),
     ("Zones", "kind", "Every zone has", world.ZoneTable, world.Zone.__args__),
     ("Magnetic bodies", "kind", "", msgspec.Struct, world.Magnetic.__args__),
-    ("Faults", "kind", "Every fault has", world.FaultTable, world.Fault.__args__),
+    ("Faults", "kind", "Every fault has", faults.FaultTable, faults.Fault.__args__),
 )
 
 

@@ -65,8 +65,8 @@ class BodyTrack:
 
     def step(self, boots: Boots, also: list[Boots], step: BodyStep) -> None:
         """A body step; moves ``boots`` and those ``also`` if no foot speaks."""
-        if step.sequence == self._last_sequence:
-            self._counters["duplicate_steps"] += 1
+        if step.sequence <= self._last_sequence and step.time_ns <= (self._heard_ns or 0):
+            self._counters["duplicate_steps"] += 1  # told again, perhaps by an engine that was restarted
             return
         self._last_sequence = step.sequence
         self._heard_ns = max(self._heard_ns or step.time_ns, step.time_ns)

@@ -21,6 +21,7 @@ from fusion.feet import Foot
 from fusion.filter import Measurement
 from fusion.joining import Joining, relative_noise
 from fusion.models import body, camera, foot_step
+from fusion.rooms.sight import Sight, sight_of
 from fusion.state import Array, FootBlock
 from fusion.taken_along import TakenAlong
 from fusion.tilt import Tilt
@@ -39,6 +40,7 @@ class Camera:
         self._join_config = replace(config, boots=boots_config)
         self._source: str | None = None
         self.foot: Foot | None = None
+        self.sight: Sight | None = None  # of the newest motion, if it told landmarks
         self._own: Array = np.zeros(4)  # pose in its own frame while not in the filter
         self._joining: Joining | None = None
         self._begin()
@@ -77,8 +79,16 @@ class Camera:
         if motion.up is not None:
             self._tilt.note_level(self._settings.level_sigma_rad)
         moved = None if finished is None else self._step(finished, yaw)
+        self._note_sight(motion)
         self._look_ahead()
         return moved
+
+    def _note_sight(self, motion: CameraMotion) -> None:
+        """Landmarks are of the motion's start, which is where the newest step has ended."""
+        self.sight = None
+        if self.foot is not None and self.foot.active and self._boots.in_enu:
+            pose = self._boots.filter.state[self.foot.block.all]
+            self.sight = sight_of(motion, self._chain.attitude, pose)
 
     def note_move(self, transform: RigidTransform) -> None:
         """The filter has changed its frame."""

@@ -19,6 +19,7 @@ import msgspec
 from bootprint.config import Config
 from bootprint.messages import Latitude, Longitude
 from bootprint.topics import check_part
+from fusion.rooms.settings import RoomsConfig
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
@@ -74,6 +75,17 @@ class GnssConfig(Config, frozen=True):
     late_sigma_m_s: NonNegative = 0.3  # what that adds to its sigma: heading errors, and stamps a little off
 
 
+class VelocityConfig(Config, frozen=True):
+    """How a receiver's speed and course are believed (``[fusion.velocity]``)."""
+
+    sigma_m_s: Positive = 0.15  # each axis of one fix: Doppler is better, shoulders sway
+    repeats: Positive = 2.0  # sway and turns err alike over so many fixes
+    fewest: Annotated[int, msgspec.Meta(ge=2)] = 4  # ways before a heading is told
+    lasting_rad: NonNegative = 0.02  # that no number of ways mends
+    placement_sigma_deg: Positive = 5.0  # heading is known when it is this sure
+    gate_probability: Probability = 0.999
+
+
 class TrustConfig(Config, frozen=True):
     """When satellites are not to be believed any more (``[fusion.trust]``)."""
 
@@ -83,6 +95,7 @@ class TrustConfig(Config, frozen=True):
     retrust_s: Positive = 20.0  # so long all of them must agree
     shadow_interval_s: Positive = 30.0  # dead reckoning without satellites begins anew this often
     scatter_window_s: Positive = 30.0  # a receiver's own scatter is of this long
+    witness_heading_sigma_deg: Positive = 8.0  # dead reckoning whose heading is less sure accuses nobody
 
 
 class AltitudeConfig(Config, frozen=True):
@@ -135,7 +148,6 @@ class FeetConfig(Config, frozen=True):
     coupling: Coupling = "passing"
     scale_sigma: NonNegative = 0.03  # of a step's length, per step: errors of steps correlate
     heading_walk_rad_sqrt_s: NonNegative = 0.0015  # 0.3 deg/min of residual drift, matched at 5 minutes
-    running_turn_sigma_rad: NonNegative = 0.05  # of a running step, beside its own: gyros saturate
     common_lifetime_s: Positive = 600.0  # what a foot's steps have in common (soles, gyro bias) lives so long
     common_correlation: Share = (
         0.5  # of scale and slope between the feet: the same person, the same estimator
@@ -175,6 +187,20 @@ class CameraConfig(Config, frozen=True):
     climb_sigma_m: Positive = 0.15  # between the feet's climb over a few metres and the camera's
 
 
+class PeersConfig(Config, frozen=True):
+    """How ranges to others of the squad are believed (``[fusion.peers]``)."""
+
+    use: bool = True
+    window_s: Positive = 5.0  # of the ranges to one peer
+    interval_s: Positive = 2.0  # between two looks at all of them
+    range_floor_m: Positive = 0.4  # of a window: antennas on two bodies, walls in between
+    worth: Share = 0.5  # a peer's variance along the line must be less than this share of one's own
+    gate_probability: Probability = 0.999
+    distrust_s: NonNegative = 30.0  # a peer that contradicts the others is not heard for so long
+    placement_accuracy_m: Positive = 15.0  # a place by ranges this good may place a soldier
+    feet_sigma_m: Positive = 0.1  # of a range between the own feet: where the radios sit on the boots
+
+
 class SilenceConfig(Config, frozen=True):
     """What silence means (``[fusion.silence]``); all in event time."""
 
@@ -210,6 +236,9 @@ class FusionConfig(Config, frozen=True):
     trust: TrustConfig = TrustConfig()
     altitude: AltitudeConfig = AltitudeConfig()
     body: BodyConfig = BodyConfig()
+    peers: PeersConfig = PeersConfig()
+    velocity: VelocityConfig = VelocityConfig()
+    rooms: RoomsConfig = RoomsConfig()
 
     def __post_init__(self) -> None:
         if len(set(self.feet)) != len(self.feet):

@@ -5,7 +5,9 @@ What comes too late to be put in order follows one rule a kind, and is counted:
 - a **FootStep** or **BodyStep** still happened: it is composed at once, onto what the foot has become meanwhile;
 - a **Fix** is a person's word: it is taken at once, the less sure by what may have been walked since;
 - a **GnssFix** is carried along by what the feet have walked since, if that is remembered, else dropped;
-- a **FootPose**, **Pressure** or **CameraMotion** is dropped: the next one comes soon.
+- a **FootPose**, **Pressure**, **Range** or **CameraMotion** is dropped: the next one comes soon.
+
+A **Track** is of another's time and says how old it is: it is taken as it comes, past the order of the own inputs.
 
 A position at t is published when everything up to t + ``lookahead_s`` has been taken in, so that it lies between
 two foot poses instead of up to a tenth of a second behind. So it depends on the messages alone, not on when ticks
@@ -28,15 +30,22 @@ from bootprint.messages import (
     GnssFix,
     Message,
     Mode,
+    Position,
     Pressure,
+    Range,
+    Track,
 )
+from bootprint.rooms import RoomMap
 from bootprint.topics import Address, Identity
 from fusion.config import FusionConfig
 from fusion.estimator import Estimator
+from fusion.feet_ranging import hold_feet, is_between_feet
 from fusion.memory import Moment, Saved, age_in_words, go_on, is_of_now, remember
 from fusion.output import Publisher, horizontal_sigma_m
 from fusion.pulse import LivePulse, ReplayPulse
 from fusion.reorder import Arrival, Promise, ReorderBuffer, Waiting
+from fusion.rooms.aid import RoomAid
+from fusion.rooms.survey import Survey, stood_at
 
 SUBJECTS = (
     "foot_step",
@@ -46,6 +55,8 @@ SUBJECTS = (
     "pressure",
     "body_step",
     "camera_motion",
+    "range",
+    "track",
 )  # at one time in this order: a step before its own poses
 SOURCE = "fusion"
 _LONGEST_LEAP_NS = 60 * NS_PER_S  # after a longer hole in time the positions between are not made up
@@ -62,9 +73,12 @@ class FusionCore:
         *,
         patient: bool = False,
         saved: Saved | None = None,
+        mapped: RoomMap | None = None,
     ) -> None:
         self.counters: Counter[str] = Counter()
         self.estimator = Estimator(config, origin, self.counters)
+        self.survey = Survey(config.rooms, identity.soldier, mapped)
+        self._rooms = RoomAid(config.rooms, config.floor_height_m, self.counters)
         self._config = config
         self._address = identity.address("position", SOURCE)
         self._publisher = Publisher(origin, config.floor_height_m)
@@ -83,11 +97,18 @@ class FusionCore:
             "pressure": self._pressure,
             "body_step": self._body_step,
             "camera_motion": self._camera_motion,
+            "range": self._range,
         }
 
     def handle(self, envelope: Envelope) -> Iterable[Envelope]:
         """Take a message of this soldier in; the positions that have become due."""
         address, message = envelope.address, envelope.message
+        if isinstance(message, Track):
+            self.estimator.cooperation.track(message)
+            return []
+        if isinstance(message, RoomMap):
+            self._hear_rooms(message)
+            return []
         if address.subject not in self._apply or not self._is_known(address):
             self.counters["unknown_sources"] += 1
             return []
@@ -142,6 +163,12 @@ class FusionCore:
         return words
 
     # --- in ----------------------------------------------------------------------------------------------------
+
+    def _hear_rooms(self, rooms: RoomMap) -> None:
+        """Another's map; one's own comes back from the bus."""
+        if rooms.soldier != self._address.soldier:
+            self.counters["rooms_messages"] += 1
+            self._rooms.hear(rooms)
 
     def _is_known(self, address: Address) -> bool:
         return not address.subject.startswith("foot_") or address.source in self._config.feet
@@ -211,6 +238,16 @@ class FusionCore:
     def _camera_motion(self, name: str, message: Message) -> None:
         if isinstance(message, CameraMotion):
             self.estimator.camera_motion(name, message)
+            if self.estimator.sight is not None and self._config.rooms.map:
+                self.survey.see(self.estimator.sight)
+
+    def _range(self, _: str, message: Message) -> None:
+        if not isinstance(message, Range):
+            return
+        if is_between_feet(message, self._address.soldier):
+            hold_feet(self.estimator.boots, message, self._config, self.counters)
+        elif self._config.peers.use:
+            self.estimator.range(message)
 
     # --- out ---------------------------------------------------------------------------------------------------
 
@@ -245,7 +282,22 @@ class FusionCore:
         while self._next_ns < before_ns:
             time_ns = self._next_ns
             self._next_ns += self._period_ns  # first, so that no error can hold time at this position
-            yield Envelope(self._address, self._publisher.position(time_ns, self.estimator.estimate(time_ns)))
+            position = self._publisher.position(time_ns, self.estimator.estimate(time_ns))
+            yield Envelope(self._address, position)
+            yield from self._map_rooms(position)
+
+    def _map_rooms(self, position: Position) -> Iterator[Envelope]:
+        """Draw the map of rooms on, tell it when it is due; others' maps hold the walk."""
+        rooms = self._config.rooms
+        if rooms.map:
+            self.survey.walk(stood_at(position, self._config.floor_height_m, rooms))
+            drawn = self.survey.due(position.time_ns)
+            if drawn is not None:
+                self.counters["rooms_told"] += 1
+                self.counters["rooms_full"] = int(self.survey.full)
+                yield Envelope(self._address.with_subject("rooms"), drawn)
+        if rooms.use:
+            self.estimator.held_by(lambda boots: self._rooms.hold(boots, position))
 
     def _follow_back(self, time_ns: int) -> Iterator[Envelope]:
         """The boots' clock has been set back: finish the old time, and go on with everything in the new."""

@@ -6,14 +6,26 @@ that is sure the filter is moved, and from then on satellites and fixes are ordi
 
 import math
 from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from bootprint.clock import NS_PER_S
 from bootprint.config import Origin
 from bootprint.geodesy import LocalFrame, yaw_of_azimuth
-from bootprint.messages import BodyStep, CameraMotion, Fix, FootPose, FootStep, GnssFix, Pressure, Vector3
-from fusion import going
+from bootprint.messages import (
+    BodyStep,
+    CameraMotion,
+    Fix,
+    FootPose,
+    FootStep,
+    GnssFix,
+    Pressure,
+    Range,
+    Vector3,
+)
+from fusion import going, told
 from fusion.alignment import Walk
 from fusion.body_track import BodyTrack
 from fusion.boots import Boots
@@ -21,16 +33,17 @@ from fusion.camera import Camera
 from fusion.carriers import Carriers
 from fusion.coasting import Coasting
 from fusion.config import FusionConfig
+from fusion.cooperation import Cooperation
 from fusion.feet import Foot
-from fusion.filter import Measurement
 from fusion.heights import Heights
 from fusion.models import body
 from fusion.output import Estimate
-from fusion.placement import UNKNOWN_UP_SIGMA_M, HeadingHint, Place, Placement, known_point
+from fusion.placement import HeadingHint, Place, Placement, known_point
 from fusion.protection import Protection, Protector
 from fusion.satellite_aid import SatelliteAid
 from fusion.satellites import SatellitePosition, Satellites
 from fusion.state import Array, xyz
+from fusion.velocity import Courses
 
 _BOOTS_AWAITED_NS = 3 * NS_PER_S  # so long a body's steps wait for the boots to speak
 _DEFAULT_AZIMUTH_SIGMA_RAD = math.radians(10.0)  # of a fix that names an azimuth but not how sure
@@ -48,11 +61,14 @@ class Estimator:
         self._aid = SatelliteAid(config, self.satellites, counters)
         self._body = BodyTrack(config.body, counters)
         self._camera = Camera(self.boots, config, counters)
+        self.sight = self._camera.sight  # what its newest motion told of its surroundings
         self._coasting = Coasting(config.silence)
         self._carriers = Carriers(config.silence, self.satellites, self._body)
         self._heights = Heights(config, self._aid.shadows, counters)
         self._protector = Protector(self._aid.shadows)
+        self.cooperation = Cooperation(config.peers, origin, counters)
         self.placement = Placement(config.align, config.gnss)
+        self._courses = Courses(config.velocity, counters)
         self.placed = False
         self._without_boots = False
         self._hint: HeadingHint | None = None  # a direction to walk off in, given when already placed
@@ -88,8 +104,11 @@ class Estimator:
         self._take_start(step)
         self._body.take_back(self.boots, self._aid.boots, step)
         self._camera.take_back(place, step)
+        dropped = self._counters["feet_dropped"]
         foot = self.boots.step(place, step)
         self._aid.step(place, step)
+        if self._counters["feet_dropped"] > dropped:
+            self._aid.forget()  # a foot that has gone astray has led shadows astray, whom no satellite held
         self._heights.step(self.boots, place, step)
         if foot is None:
             return
@@ -105,7 +124,8 @@ class Estimator:
         if not self.placed:
             self._try_placing()
         elif self._hint is not None and self._hint.is_learned(self._config.align):
-            self._turn_to(self._hint)
+            self._aid.forget()
+            told.turn(self.boots, self._hint)
             self._hint = None
 
     def pose(self, place: str, pose: FootPose) -> None:
@@ -117,6 +137,7 @@ class Estimator:
     def camera_motion(self, source: str, motion: CameraMotion) -> None:
         """A camera has moved."""
         step = self._camera.take(source, motion)
+        self.sight = self._camera.sight
         if self.boots.standing_in(motion.time_ns):
             self._aid.forget()  # shadows have no camera: they stay behind
         if step is None:
@@ -130,14 +151,11 @@ class Estimator:
         """The body-worn unit has made a step."""
         if self.boots.reference is None and step.time_ns - self._begun_ns > _BOOTS_AWAITED_NS:
             self.boots.adopt(step.start_time_ns)
-            self._start_without_boots(step.start_time_ns)
+            if self._start is not None:
+                self.placement.observe(known_point(self._start, self._frame, step.start_time_ns))
+            self._start, self._without_boots = None, True
+            self._try_placing()
         self._body.step(self.boots, self._aid.boots, step)
-
-    def _start_without_boots(self, time_ns: int) -> None:
-        if self._start is not None:
-            self.placement.observe(known_point(self._start, self._frame, time_ns))
-        self._start, self._without_boots = None, True
-        self._try_placing()
 
     def pressure(self, pressure: Pressure) -> None:
         """A barometer has measured."""
@@ -156,6 +174,8 @@ class Estimator:
             return
         if late_s > 0.0:
             position = self.satellites.late(position, xyz(moved) if self.placed else (0.0, 0.0, 0.0), late_s)
+        elif self._aid.believes(source):
+            self.placement.course = self._courses.hear(self.boots, source, fix)
         if self.placed:
             self._correct_by(position)
         elif position.sigma_m > self._config.gnss.placement_accuracy_m:
@@ -166,6 +186,15 @@ class Estimator:
             self.placement.observe(
                 Place(fix.time_ns, position.enu, position.sigma_m, position.up_sigma_m, local, source)
             )
+            self._try_placing()
+
+    def range(self, message: Range) -> None:
+        """A range to another soldier: a correction, or a place for who has none."""
+        if self.placed:
+            self._coasting.own_up(self.boots, message.time_ns)
+        place = self.cooperation.range(self.boots, message)
+        if place is not None:
+            self.placement.observe(place)
             self._try_placing()
 
     def fix(self, fix: Fix, late_s: float = 0.0) -> None:
@@ -207,35 +236,12 @@ class Estimator:
             self._protector.know(move.target)
             self._counters["placed"] += 1
 
-    def _turn_to(self, hint: HeadingHint) -> None:
-        """A placed soldier has walked off in a named direction: correct the yaw of the foot that was watched."""
-        self._aid.forget()
-        foot = self.boots.reference
-        if foot is None:
-            return
-        turn, sigma = hint.turn_rad, hint.turn_sigma_rad
-        jacobian = np.zeros((1, self.boots.filter.state.size))
-        jacobian[0, foot.block.yaw] = 1.0
-        self.boots.filter.widen_together(np.zeros((3, 3)), turn**2)  # a person is believed, as with places
-        self.boots.correct(Measurement("azimuth", np.array([turn]), jacobian, np.array([[sigma**2]])))
-
     def _believe(self, place: Place) -> None:
-        """A person's word is not gated: where it contradicts the estimate, the estimate was not that sure."""
+        """A person's word is not gated."""
         self._aid.forget()
         self._body.placed()
         self._protector.know(place.enu)
-        stands = self.boots.stands(place.time_ns)
-        residual = np.array(place.enu) - body.position(self.boots.filter.state, stands)
-        axes = 2 if place.up_sigma_m is None else 3
-        expected = np.diag(self._covariance(self.boots.alive(place.time_ns)))
-        surprise = np.zeros(3)
-        surprise[:axes] = np.maximum(0.0, residual**2 - expected)[:axes]
-        self.boots.filter.widen_together(np.diag(surprise))
-        noise = np.diag([place.sigma_m**2, place.sigma_m**2, (place.up_sigma_m or UNKNOWN_UP_SIGMA_M) ** 2])
-        jacobian = body.position_jacobian(self.boots.filter.state, stands)
-        self.boots.correct(
-            Measurement("fix", residual[:axes], jacobian[:axes], np.ascontiguousarray(noise[:axes, :axes]))
-        )
+        told.believe(self.boots, place, self._covariance(self.boots.alive(place.time_ns)))
 
     def _correct_by(self, position: SatellitePosition) -> None:
         self._coasting.own_up(self.boots, position.time_ns)
@@ -243,11 +249,25 @@ class Estimator:
         self.boots = self._aid.correct(self.boots, position)
         self._camera.follow(self.boots)
 
+    def held_by(self, hold: Callable[[Boots], bool]) -> None:
+        """Something outside (a map) may hold a placed walk: shadows do not know of it and are forgotten."""
+        if self.placed and hold(self.boots):
+            self._aid.forget()
+
     def shift(self, by_ns: int) -> None:
         """The boots' clock has been set: all that was remembered by the old one moves along."""
         self._begun_ns += by_ns
         self._aid.forget()
-        for part in (self.boots, self._camera, self.satellites, self.placement, self._heights):
+        parts = (
+            self.boots,
+            self._camera,
+            self.satellites,
+            self.placement,
+            self._heights,
+            self.cooperation,
+            self._courses,
+        )
+        for part in parts:
             part.shift(by_ns)
 
     # --- what is asked -----------------------------------------------------------------------------------------
@@ -256,48 +276,49 @@ class Estimator:
         """The answer at ``now_ns``."""
         silent_s = self.boots.silent_s(now_ns)
         alive = self.boots.alive(now_ns) if silent_s is not None else []
+        going_on = alive if silent_s is not None and silent_s <= self._config.silence.coasting_s else []
+        unplaced = self._unplaced(now_ns, going_on)
         known = self._pose(now_ns, silent_s, alive)
         if known is None:
-            return self._unplaced(now_ns, silent_s, alive)
+            return unplaced
         enu, covariance, turn = known
         covariance = covariance + self._coasting.pending_m2(silent_s) * np.eye(3)
         dead_s = (now_ns - self._begun_ns) / NS_PER_S if silent_s is None else silent_s
-        moving = silent_s is not None and silent_s <= self._config.silence.coasting_s
         velocity, speed, course_sigma = (
-            going.motion(self.boots, alive, turn) if moving else ((0.0, 0.0, 0.0), 0.0, None)
+            going.motion(self.boots, going_on, turn) if going_on else ((0.0, 0.0, 0.0), 0.0, None)
         )
-        return Estimate(
+        return replace(
+            unplaced,
             mode=self._carriers.mode(self.boots, now_ns, dead_s, covariance),
             enu=enu,
             covariance=covariance,
             velocity=velocity,
             speed_m_s=speed,
             course_sigma_rad=course_sigma,
-            motion=going.motion_class(self.boots, now_ns) if moving else "unknown",
-            sources=self._carriers.sources(self.boots, now_ns, alive if moving else []),
-            rejected=(*self.boots.refused, *self.satellites.refused(now_ns)),
-            rejections=dict.fromkeys(self.boots.refused, "diverged") | self.satellites.why_refused(now_ns),
             protection=self._protection(now_ns, enu, covariance) if self.placed else None,
         )
+
+    def _unplaced(self, now_ns: int, going_on: list[Foot]) -> Estimate:
+        """Nothing is known but that the soldier is in the area: at the origin, give or take a lot."""
+        return Estimate(
+            mode="unplaced",
+            enu=(0.0, 0.0, 0.0),
+            covariance=self._config.unplaced_sigma_m**2 * np.eye(3),
+            speed_m_s=going.speed_m_s(going_on) if going_on else 0.0,
+            motion=going.motion_class(self.boots, now_ns) if going_on else "unknown",
+            sources=self._carriers.sources(self.boots, now_ns, going_on),
+            rejections=self._left_out(now_ns),
+        )
+
+    def _left_out(self, now_ns: int) -> dict[str, str]:
+        """Sources that are not believed, and why."""
+        feet = dict.fromkeys(self.boots.refused, "diverged")
+        peers = dict.fromkeys(self.cooperation.doubted(now_ns), "contradicted")
+        return feet | self.satellites.why_refused(now_ns) | peers
 
     def _protection(self, now_ns: int, enu: Vector3, covariance: Array) -> Protection:
         fresh = bool(self.satellites.fresh(now_ns))
         return self._protector.protect(enu, covariance, now_ns, by_satellites=fresh)
-
-    def _unplaced(self, now_ns: int, silent_s: float | None, alive: list[Foot]) -> Estimate:
-        """Nothing is known but that the soldier is in the area: at the origin, give or take a lot."""
-        sigma = self._config.unplaced_sigma_m
-        moving = silent_s is not None and silent_s <= self._config.silence.coasting_s
-        return Estimate(
-            mode="unplaced",
-            enu=(0.0, 0.0, 0.0),
-            covariance=np.diag([sigma**2, sigma**2, sigma**2]),
-            speed_m_s=going.speed_m_s(alive) if moving else 0.0,
-            motion=going.motion_class(self.boots, now_ns) if moving else "unknown",
-            sources=self._carriers.sources(self.boots, now_ns, alive if moving else []),
-            rejected=(*self.boots.refused, *self.satellites.refused(now_ns)),
-            rejections=dict.fromkeys(self.boots.refused, "diverged") | self.satellites.why_refused(now_ns),
-        )
 
     def _pose(
         self, now_ns: int, silent_s: float | None, alive: list[Foot]
@@ -312,26 +333,14 @@ class Estimator:
             spread = move.rotation() @ self._covariance(alive) @ move.rotation().T
             covariance = spread + jacobian @ move.covariance @ jacobian.T
             return xyz(move.point(xyz(local))), covariance, (move.yaw_rad, math.sqrt(move.covariance[3, 3]))
-        return self._near_a_place(now_ns, silent_s, xyz(local), alive)
-
-    def _near_a_place(
-        self, now_ns: int, silent_s: float | None, local: Vector3, alive: list[Foot]
-    ) -> tuple[Vector3, Array, None] | None:
-        """Heading unknown: on a circle around the place that tells most."""
-        nearest = self.placement.nearest(local)
-        if nearest is None:
+        around = self.placement.around(xyz(local), self._covariance(alive) if alive else np.zeros((3, 3)))
+        if around is None:
             return None
-        place, variance = nearest
+        place, enu, covariance = around
         if silent_s is None:  # no boots at all: time alone makes the place worth less
-            variance += (self._config.silence.drift_m_s * max(0.0, (now_ns - place.time_ns) / NS_PER_S)) ** 2
-        up_variance = (UNKNOWN_UP_SIGMA_M if place.up_sigma_m is None else place.up_sigma_m) ** 2
-        up = place.enu[2] + local[2] - place.local[2]
-        walked = self._covariance(alive) if alive else np.zeros((3, 3))
-        return (
-            (place.enu[0], place.enu[1], up),
-            np.diag([variance, variance, up_variance]) + np.diag(np.diag(walked)),
-            None,
-        )
+            drift_m = self._config.silence.drift_m_s * max(0.0, (now_ns - place.time_ns) / NS_PER_S)
+            covariance = covariance + drift_m**2 * np.diag([1.0, 1.0, 0.0])
+        return enu, covariance, None
 
     def _covariance(self, alive: list[Foot]) -> Array:
         """Covariance (3, 3) of the body's position in the filter's frame, m²."""

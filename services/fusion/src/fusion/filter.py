@@ -36,7 +36,11 @@ class Measurement:
     """A linearised measurement: ``residual = z − h(x)`` (k,), ``jacobian = ∂h/∂x`` (k, n), noise (k, k).
 
     ``gate_noise`` is the size of a single error where that differs from what an update may assume (errors that
-    repeat); ``gate_probability`` None takes the measurement whatever its innovation is.
+    repeat); ``gate_probability`` None takes the measurement whatever its innovation is. ``entangled``: the error
+    may share anything with the state's own, for it may stem from what others were told of it. Then the state takes
+    the measurement over, error and all, instead of a mean of both: what is left of its own error is independent of
+    what was replaced, so nothing counts twice. (Covariance intersection along the measured directions, whose
+    optimum between two scalars is the surer of them: Julier and Uhlmann 1997.)
     """
 
     source: str
@@ -45,6 +49,7 @@ class Measurement:
     noise: Array
     gate_noise: Array | None = None
     gate_probability: float | None = None
+    entangled: bool = False
 
 
 def invert_spd(matrix: Array) -> Array:
@@ -69,6 +74,29 @@ class StateFilter:
         self.state = np.concatenate([self.state, np.zeros(FOOT_SIZE)])
         self.covariance = np.pad(self.covariance, (0, FOOT_SIZE))
         return self.layout.beside[-1]
+
+    def attach(self, name: str, offset: Array, response: Array, noise: Array) -> None:
+        """An offset, (3,): it errs with the state by ``response`` (3, n), and by ``noise`` (3, 3) of its own."""
+        self.layout = self.layout.with_attached(name)
+        more = self.layout.size - self.state.size
+        self.state = np.concatenate([self.state, np.zeros(more)])
+        self.covariance = np.pad(self.covariance, (0, more))
+        block = self.layout.attached_of(name)
+        transition = np.eye(self.layout.size)
+        transition[block] = np.pad(response, ((0, 0), (0, more)))
+        self.state[block] = offset
+        self.covariance = transition @ self.covariance @ transition.T
+        self.covariance[block, block] += noise
+
+    def detach(self, name: str) -> None:
+        """This offset means nothing any more."""
+        self.layout = self.layout.without(name)
+
+    def loosen(self, block: slice, covariance: Array) -> None:
+        """An offset may have changed, give or take (3, 3)."""
+        process = np.zeros_like(self.covariance)
+        process[block, block] = covariance
+        self._advance(self.state, np.eye(self.layout.size), process)
 
     def propagate(
         self, block: FootBlock, step: FootStep, noise: Array, shares: Shares | None = None, kept: float = 1.0
@@ -131,7 +159,7 @@ class StateFilter:
         """The gain, and with it state and covariance (Joseph's form: right for any gain, and never indefinite)."""
         jacobian, noise = measurement.jacobian, measurement.noise
         shared = self.covariance @ jacobian.T
-        gain = shared @ invert_spd(jacobian @ shared + noise)
+        gain = shared @ invert_spd(jacobian @ shared + (0.0 if measurement.entangled else 1.0) * noise)
         kept = np.eye(self.layout.size) - gain @ jacobian
         self.state = self.state + gain @ measurement.residual
         self.covariance = kept @ self.covariance @ kept.T + gain @ noise @ gain.T

@@ -1,39 +1,45 @@
 """The fusion service: ``fusion --config computer.toml``."""
 
+from bootprint.remembering import Memory, RememberingPart, recall
+from bootprint.rooms import RoomMap
+from bootprint.saved_state import StateFile
 from bootprint.service import Context, CorePart, Part, Service
 from fusion.config import FusionConfig
 from fusion.engine import SUBJECTS, FusionCore
-from fusion.memory import FILE, FusionPart, Saved, load, objection
+from fusion.memory import FILE, FORM, SAVE_EVERY_NS, kept_of, understood
+from fusion.rooms.memory import FILE as ROOMS_FILE
+from fusion.rooms.memory import KeepsRooms, load_rooms
 
 
 def build(context: Context) -> Part:
     """The core of this computer's soldier, set up from ``[fusion]``."""
     computer = context.computer
     config = computer.section("fusion", FusionConfig)
+    origin = computer.realm.origin
     if context.lossless:  # a replay at full speed: another time's walk
-        return CorePart(FusionCore(config, computer.identity, computer.realm.origin, patient=True))
-    core = FusionCore(config, computer.identity, computer.realm.origin, saved=_remembered(context, config))
-    return FusionPart(core, computer.state_dir / FILE)
+        return CorePart(FusionCore(config, computer.identity, origin, patient=True))
+    file = StateFile(computer.state_dir / FILE, FORM)
+    left = recall(file, lambda kept: understood(kept, context.identity.soldier, config))
+    mapped = _mapped(context) if config.rooms.map else None
+    core = FusionCore(config, computer.identity, origin, saved=left.value, mapped=mapped)
+    memory = Memory(file, SAVE_EVERY_NS, lambda: kept_of(core.remembered()), left.refusal)
+    return KeepsRooms(RememberingPart(core, memory), computer.state_dir / ROOMS_FILE, origin)
 
 
-def _remembered(context: Context, config: FusionConfig) -> Saved | None:
-    """What an earlier process left of this soldier's walk; told and left aside if it cannot be gone on from."""
-    path = context.computer.state_dir / FILE
+def _mapped(context: Context) -> RoomMap | None:
+    """The map of rooms that an earlier process left; told and left aside if it cannot be read."""
+    path = context.computer.state_dir / ROOMS_FILE
     try:
-        saved = load(path)
-        reason = None if saved is None else objection(saved, context.identity.soldier, config)
+        return load_rooms(path, context.computer.realm.origin)
     except (OSError, ValueError) as error:
-        saved, reason = None, str(error)
-    if reason is None:
-        return saved
-    context.log.warning("saved state refused, starting afresh", file=str(path), reason=reason)
-    return None
+        context.log.warning("map of rooms refused, drawing afresh", file=str(path), reason=str(error))
+        return None
 
 
 SERVICE = Service(
     name="fusion",
     summary="Both boots and satellites into one position that knows how wrong it may be.",
-    subjects=SUBJECTS,
+    subjects=(*SUBJECTS, "rooms"),
     build=build,
 )
 

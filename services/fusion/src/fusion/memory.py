@@ -9,29 +9,24 @@ refused too where the configuration names another start than it did: somebody ha
 """
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Final
 
 import msgspec
 import numpy as np
 
-from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.config import Config
-from bootprint.figures import Figures
-from bootprint.files import write_whole
 from bootprint.messages import MotionClass
-from bootprint.service import CorePart, CoreWithFigures
+from bootprint.saved_state import Form, Kept
 from fusion.config import FusionConfig, StartConfig
 from fusion.estimator import Estimator
 from fusion.feet import Foot
 from fusion.state import Array, Layout
 
-FILE = "fusion-state.msgpack"
+FILE = "fusion.state"
+FORM: Final = Form("fusion", version=1, capacity=64 * 1024)
 SAVE_EVERY_NS = 2 * NS_PER_S
-VERSION = 1
 _TOLD_AGAIN_NS = 600 * NS_PER_S  # no cache of the bus reaches further back
 _SKEW = 1e-6  # relative: what rounding may leave of symmetry
 
@@ -53,7 +48,6 @@ class Saved(Config, frozen=True):
     ``next_ns`` and ``sequence`` are those of the next position; ``reference`` names the foot whose track counts.
     """
 
-    version: int
     soldier: str
     time_ns: int
     next_ns: int
@@ -66,21 +60,20 @@ class Saved(Config, frozen=True):
     feet: dict[str, SavedFoot]
 
 
-class Remembering(CoreWithFigures, Protocol):
-    """A core that can be asked what to save."""
-
-    def remembered(self) -> Saved | None:
-        """What a restart could go on from; None before there is anything."""
-
-
-def load(path: Path) -> Saved | None:
-    """The memory in a file, None if there is none; ValueError or OSError if it cannot be read."""
-    if not path.exists():
-        return None
+def understood(kept: Kept, soldier: str, config: FusionConfig) -> Saved:
+    """The memory in a file of state; ValueError if it is no memory, or cannot be this soldier's."""
     try:
-        return msgspec.msgpack.decode(path.read_bytes(), type=Saved)
+        saved = msgspec.msgpack.decode(kept.payload, type=Saved)
     except msgspec.MsgspecError as error:
-        raise ValueError(f"damaged: {error}") from error
+        raise ValueError(f"no walk: {error}") from error
+    if reason := objection(saved, soldier, config):
+        raise ValueError(reason)
+    return saved
+
+
+def kept_of(saved: Saved | None) -> Kept | None:
+    """A memory as a file of state keeps it."""
+    return None if saved is None else Kept(saved.time_ns, msgspec.msgpack.encode(saved))
 
 
 def objection(saved: Saved, soldier: str, config: FusionConfig) -> str | None:
@@ -88,7 +81,6 @@ def objection(saved: Saved, soldier: str, config: FusionConfig) -> str | None:
     size = len(saved.state)
     expected = Layout.of(config.feet).size
     reasons = {
-        f"of version {saved.version}": saved.version != VERSION,
         f"of soldier {saved.soldier!r}": saved.soldier != soldier,
         f"of feet {', '.join(saved.feet)}": tuple(saved.feet) != config.feet
         or saved.reference not in saved.feet,
@@ -141,7 +133,6 @@ def remember(estimator: Estimator, config: FusionConfig, soldier: str, moment: M
         return None
     feet = slice(0, boots.filter.layout.feet_size)
     return Saved(
-        version=VERSION,
         soldier=soldier,
         time_ns=moment.time_ns,
         next_ns=moment.next_ns,
@@ -176,41 +167,3 @@ def go_on(estimator: Estimator, saved: Saved) -> None:
     state, covariance = arrays(saved)
     estimator.boots.go_on(state, covariance, saved.reference, saved.began_ns)
     estimator.go_on()
-
-
-class FusionPart(CorePart):
-    """The fusion core with its memory saved every two seconds of event time and at the end."""
-
-    def __init__(self, core: Remembering, path: Path) -> None:
-        super().__init__(core)
-        self._remembering, self._path = core, path
-        self._saved_ns: int | None = None
-        self._unsaved = 0
-
-    def figures(self) -> Figures:
-        """The core's own, and how often the memory could not be saved."""
-        figures = super().figures()
-        return replace(figures, counters=figures.counters | {"memory_unsaved": self._unsaved})
-
-    def tick(self, now_ns: int) -> Iterable[Envelope]:
-        """Save when it is time."""
-        said = list(super().tick(now_ns))
-        if self._saved_ns is None or abs(now_ns - self._saved_ns) >= SAVE_EVERY_NS:
-            self._saved_ns = now_ns
-            self._save()
-        return said
-
-    def close(self) -> Iterable[Envelope]:
-        """Let the core say its last words, and save."""
-        said = list(super().close())
-        self._save()
-        return said
-
-    def _save(self) -> None:
-        saved = self._remembering.remembered()
-        if saved is None:
-            return
-        try:
-            write_whole(self._path, msgspec.msgpack.encode(saved))
-        except OSError:
-            self._unsaved += 1  # a full disk costs the memory, not the soldier

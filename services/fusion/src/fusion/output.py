@@ -28,7 +28,6 @@ class Estimate:
     course_sigma_rad: float | None = None
     motion: MotionClass = "unknown"
     sources: tuple[str, ...] = ()
-    rejected: tuple[str, ...] = ()
     rejections: dict[str, str] = field(default_factory=dict)
     protection: Protection | None = None
 
@@ -65,7 +64,7 @@ class Publisher:
             floor=self._floor_of(estimate),
             motion=estimate.motion,
             sources=estimate.sources,
-            rejected=estimate.rejected,
+            rejected=tuple(estimate.rejections),
             reliability_pct=reliability_pct(estimate),
             rejections=estimate.rejections,
             protection_m=None if estimate.protection is None else estimate.protection.radius_m,

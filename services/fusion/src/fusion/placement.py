@@ -99,6 +99,7 @@ class Placement:
     gnss: GnssConfig
     places: list[Place] = field(default_factory=list)
     hint: HeadingHint | None = None
+    course: tuple[float, float] | None = None  # the turn into ENU and its sigma, rad, as Doppler tells it
     refused: int = 0  # places that did not fit the track
     _fit: RigidTransform | None = None
 
@@ -131,17 +132,21 @@ class Placement:
         """The move into ENU once it is sure enough to be made."""
         if self.hint is not None and self.hint.is_learned(self.align):
             return self._hinted(self.hint)
-        return self._fit
+        return self._fit or (None if self.course is None else self._turned(*self.course))
 
     @property
     def northward(self) -> RigidTransform | None:
         """The move to the best known place of a frame whose yaw is true already; None before any is known."""
+        return self._turned(0.0, 0.0)
+
+    def _turned(self, yaw_rad: float, sigma_rad: float) -> RigidTransform | None:
+        """The move by a known turn to the best known place; None before any is known."""
         best = min(self.places, key=lambda place: place.sigma_m, default=None)
         if best is None:
             return None
         up_sigma = UNKNOWN_UP_SIGMA_M if best.up_sigma_m is None else best.up_sigma_m
-        covariance = np.diag([best.sigma_m**2, best.sigma_m**2, up_sigma**2, 0.0])
-        return RigidTransform(best.local, best.enu, 0.0, covariance)
+        covariance = np.diag([best.sigma_m**2, best.sigma_m**2, up_sigma**2, sigma_rad**2])
+        return RigidTransform(best.local, best.enu, yaw_rad, covariance)
 
     @property
     def provisional(self) -> RigidTransform | None:
@@ -164,6 +169,19 @@ class Placement:
 
         best = min(reversed(self.places), key=variance)
         return best, variance(best)
+
+    def around(self, local: Vector3, walked: Array) -> tuple[Place, Vector3, Array] | None:
+        """Heading unknown: on a circle around the place that tells most; it, ENU, and the covariance (3, 3), m².
+
+        ``walked`` (3, 3): how sure the way is. None if no place is known.
+        """
+        nearest = self.nearest(local)
+        if nearest is None:
+            return None
+        place, variance = nearest
+        up_sigma_m = UNKNOWN_UP_SIGMA_M if place.up_sigma_m is None else place.up_sigma_m
+        enu = (place.enu[0], place.enu[1], place.enu[2] + local[2] - place.local[2])
+        return place, enu, np.diag([variance, variance, up_sigma_m**2]) + np.diag(np.diag(walked))
 
     def _hinted(self, hint: HeadingHint) -> RigidTransform:
         place = hint.place

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from fusion.models import body, gnss
 from fusion.satellites import SatellitePosition, Satellites
 from fusion.shadows import Shadow, Shadows
 from fusion.state import Array
-from fusion.trust import Receiver, normalised_squared, residual
+from fusion.trust import Receiver, heading_sigma_rad, normalised_squared, residual
 
 # Stated for the height itself, where the plane's figure is for both axes together; and the air's delays last.
 _HEIGHT_LASTS = 2.0
@@ -51,6 +52,10 @@ class SatelliteAid:
         """The boots have been moved from outside: shadows of before say nothing any more."""
         self.shadows.clear()
 
+    def believes(self, source: str) -> bool:
+        """Whether a receiver is not known to go astray."""
+        return source not in self._receivers or self._receivers[source].distrusted_ns is None
+
     # --- satellites ---------------------------------------------------------------------------------------------
 
     def correct(self, boots: Boots, position: SatellitePosition) -> Boots:
@@ -79,8 +84,16 @@ class SatelliteAid:
         silent_s = boots.silent_s(position.time_ns)
         if silent_s is None or silent_s > self._coasting_s or boots.standing_in(position.time_ns):
             return False  # nothing to compare with: shadows have no camera
-        astray = any(self._astray_by(shadow, position) > 1.0 for shadow in self.shadows)
+        astray = any(self._astray_by(shadow, position) > 1.0 for shadow in self._witnesses())
         return receiver.strays(astray, position.time_ns, self._trust.confirm_s)
+
+    def _witnesses(self) -> Iterator[Shadow]:
+        """Shadows whose heading is sure: beyond that their covariance, a linear one, is none of their errors.
+
+        A runner's gyros saturate: within a minute of it boots can turn by more than a spoofer could drag.
+        """
+        surest = math.radians(self._trust.witness_heading_sigma_deg)
+        return (shadow for shadow in self.shadows if heading_sigma_rad(shadow.boots) <= surest)
 
     def _astray_by(self, shadow: Shadow, position: SatellitePosition) -> float:
         """How far a fix is from where a shadow is, of what both their errors explain."""
@@ -93,7 +106,7 @@ class SatelliteAid:
         """To the shadow that contradicts most: it has seen all of the drag, by the sharpest dead reckoning."""
         receiver.distrust(position.time_ns)
         self._counters["gnss_distrusted"] += 1
-        best = max(self.shadows, key=lambda shadow: self._astray_by(shadow, position), default=None)
+        best = max(self._witnesses(), key=lambda shadow: self._astray_by(shadow, position), default=None)
         if best is not None:
             boots = self.shadows.revived(best, self._counters)
         self.shadows.clear()

@@ -7,7 +7,8 @@ stance, and its x axis is that foot's forward axis there.
 
 Behind the feet's poses stand the errors that all steps of a foot share (scale, slope, turn), in units of the sigma
 that its steps name, then the width (m) at which the feet pass each other, and each foot's error of its compass.
-Last comes who walks beside the feet, a camera: a pose as a foot's, from when it is first taken in.
+Then comes who walks beside the feet, a camera: a pose as a foot's, from when it is first taken in. And whatever
+else is compared with the walk, a map of rooms, has an offset (east, north m, turn rad) attached.
 """
 
 from collections.abc import Sequence
@@ -21,6 +22,8 @@ from bootprint.messages import Vector3
 Array = npt.NDArray[np.float64]
 FOOT_SIZE = 4
 COMMON_SIZE = 3
+OFFSET_SIZE = 3
+DETACHED = ""
 
 
 def xyz(values: Array) -> Vector3:
@@ -63,6 +66,7 @@ class Layout:
 
     blocks: tuple[FootBlock, ...]  # of the feet
     beside: tuple[FootBlock, ...] = ()  # of who walks beside them
+    attached: tuple[tuple[str, int], ...] = ()  # names of offsets, and where they start
 
     @classmethod
     def of(cls, feet: Sequence[str]) -> "Layout":
@@ -77,7 +81,27 @@ class Layout:
 
     def with_beside(self, place: str) -> "Layout":
         """The same with one more beside the feet, behind everything else."""
-        return Layout(self.blocks, (*self.beside, FootBlock(place, self.size)))
+        return Layout(self.blocks, (*self.beside, FootBlock(place, self.size)), self.attached)
+
+    def with_attached(self, name: str) -> "Layout":
+        """The same with one more offset, where one was detached or behind everything else."""
+        free = next((at for each, at in self.attached if each == DETACHED), None)
+        if free is None:
+            return Layout(self.blocks, self.beside, (*self.attached, (name, self.size)))
+        return self._renamed(free, name)
+
+    def without(self, name: str) -> "Layout":
+        """The same with an offset detached; others stay where they are."""
+        block = self.attached_of(name)
+        return self if block is None else self._renamed(block.start, DETACHED)
+
+    def _renamed(self, start: int, name: str) -> "Layout":
+        renamed = tuple((name if at == start else each, at) for each, at in self.attached)
+        return Layout(self.blocks, self.beside, renamed)
+
+    def attached_of(self, name: str) -> slice | None:
+        """East, north (m), turn (rad) of that offset, if it is attached."""
+        return next((slice(at, at + OFFSET_SIZE) for each, at in self.attached if each == name), None)
 
     @property
     def walkers(self) -> tuple[FootBlock, ...]:
@@ -101,4 +125,4 @@ class Layout:
     @property
     def size(self) -> int:
         """Length of the state vector."""
-        return self.feet_size + FOOT_SIZE * len(self.beside)
+        return self.feet_size + FOOT_SIZE * len(self.beside) + OFFSET_SIZE * len(self.attached)

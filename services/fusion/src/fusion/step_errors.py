@@ -28,7 +28,7 @@ class StepErrors:
         if own is None:
             unmodelled = foot_step.unmodelled(step.displacement_m, _duration_s(step), self._config)
             return StepError(covariance + unmodelled, None)
-        return StepError(own + foot_step.hurried(step, self._config), shares)
+        return StepError(own, shares)
 
     def kept(self, step: FootStep) -> float:
         """How much of the shared errors is still the same after this step."""

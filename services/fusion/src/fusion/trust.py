@@ -6,6 +6,7 @@ for a while. How large a receiver's errors are is its own word, or how much its 
 line against dead reckoning, whichever is more: receivers near walls promise too much, and a drag is no scatter.
 """
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -33,6 +34,15 @@ def normalised_squared(boots: Boots, enu: Array, sigma_m: float, time_ns: int) -
     """The same in units of both errors, squared: chi-square of 2 degrees of freedom."""
     away, covariance = residual(boots, enu, time_ns)
     return float(away @ invert_spd(covariance + sigma_m**2 * np.eye(2)) @ away)
+
+
+def heading_sigma_rad(boots: Boots) -> float:
+    """How sure the heading of the surest foot is, 1 sigma; infinite without any."""
+    covariance = boots.filter.covariance
+    variances = (
+        float(covariance[foot.block.yaw, foot.block.yaw]) for foot in boots.feet.values() if foot.carries
+    )
+    return math.sqrt(min(variances, default=math.inf))
 
 
 @dataclass(slots=True)

@@ -10,7 +10,10 @@ from bootprint.geomagnetism import earth_field
 from bootprint.messages import FootPose, FootStep, ImuBatch, Vector3, upper_triangle
 from bootprint.topics import Address
 from pdr_engine.foot import FootEstimates, FootNavigator, FootSettings, FootStepEstimate
+from pdr_engine.foot_record import condensed, restored
+from pdr_engine.memory import SavedBoot
 from pdr_engine.rate import NS_PER_S, RateMeter
+from pdr_engine.told_again import Had
 
 
 class Boot:
@@ -36,9 +39,14 @@ class Boot:
         self._position: Vector3 = (0.0, 0.0, 0.0)  # where the newest step ended, nav frame
         self._yaw_rad = 0.0
         self._rate = RateMeter()
+        self._had = Had()
+        self._batch = -1  # number of the newest
 
     def handle(self, batch: ImuBatch) -> Iterable[Envelope]:
         """Take a batch in; steps and poses that it makes known come out."""
+        if not self._had.is_new(batch):
+            return ()
+        self._batch = batch.sequence
         times = batch.times
         self._rate.count(int(times[-1]), len(times))
         mag = batch.mag
@@ -49,6 +57,28 @@ class Boot:
     def close(self) -> Iterable[Envelope]:
         """The end of the stream: what still waited."""
         return self._publish(self._navigator.finish())
+
+    def remembered(self) -> SavedBoot | None:
+        """What a restart could go on from; None before the first sample."""
+        if self._rate.newest_ns is None:
+            return None
+        return SavedBoot(
+            record=condensed(self._navigator.state),
+            newest_ns=self._rate.newest_ns,
+            batch=self._batch,
+            steps=self._steps,
+            poses=self._poses,
+            cell=self._cell,
+            position=self._position,
+            yaw_rad=self._yaw_rad,
+        )
+
+    def go_on(self, saved: SavedBoot) -> None:
+        """Be the boot that was saved; ValueError if its record is none."""
+        self._navigator.go_on(restored(saved.record))
+        self._steps, self._poses, self._cell = saved.steps, saved.poses, saved.cell
+        self._position, self._yaw_rad = saved.position, saved.yaw_rad
+        self._batch, self._had = saved.batch, Had(saved.newest_ns, saved.batch)
 
     def counters(self) -> dict[str, int]:
         """Counts since the start."""

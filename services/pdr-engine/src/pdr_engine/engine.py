@@ -1,7 +1,8 @@
 """The pdr-engine's core: inertial batches of a soldier's boots and body in, steps and foot poses out."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cached_property, partial
 
 from bootprint.bus import Envelope
 from bootprint.config import Origin
@@ -12,6 +13,7 @@ from pdr_engine.body.azimuth.deviation import Deviation
 from pdr_engine.body.length.personal import Person
 from pdr_engine.boot import Boot
 from pdr_engine.config import PdrConfig
+from pdr_engine.memory import Saved, is_of_now, newest_ns, owner_of
 from pdr_engine.rate import NS_PER_S
 from pdr_engine.trunk import Trunk
 
@@ -23,10 +25,20 @@ class EngineCore:
     """One soldier's boots and body-worn unit. Outputs depend on the messages alone; `tick` only tells
     figures what time it is.
 
-    ``origin`` is the realm's: with it, steps tell magnetic azimuths from true north.
+    ``origin`` is the realm's: with it, steps tell magnetic azimuths from true north. ``saved`` is what an earlier
+    engine left (`remembered`); it is gone on from if the first samples are of its time.
     """
 
-    def __init__(self, config: PdrConfig, identity: Identity, origin: Origin | None = None) -> None:
+    def __init__(
+        self,
+        config: PdrConfig,
+        identity: Identity,
+        origin: Origin | None = None,
+        saved: Saved | None = None,
+    ) -> None:
+        self._config, self._identity = config, identity
+        self._saved = saved  # until the first sample
+        self._refusal: list[str] = []
         self._boots = {
             place: Boot(config.foot, identity.address("imu", place), config.pose_interval_s, origin)
             for place in config.feet
@@ -49,11 +61,52 @@ class EngineCore:
         if self._trunk is not None and isinstance(envelope.message, GnssFix):
             self._trunk.hear_fix(envelope.message)
             return []
+        if self._saved is not None and isinstance(envelope.message, ImuBatch):
+            self._go_on(self._saved, envelope.message.time_ns)
+            self._saved = None
         unit = self._units.get(envelope.address.source)
         if unit is None or not isinstance(envelope.message, ImuBatch):
             self._counters["other_places"] += 1
             return []
         return list(unit.handle(envelope.message))
+
+    def _go_on(self, saved: Saved, time_ns: int) -> None:
+        """Go on from what was saved, if it is of now; a unit whose record is none begins anew alone."""
+        if not is_of_now(saved, time_ns):
+            self._refuse(f"it is {round((time_ns - saved.time_ns) / NS_PER_S)} s old")
+            return
+        for place, boot in saved.boots.items():
+            self._unit_goes_on(partial(self._boots[place].go_on, boot))
+        if self._trunk is not None and saved.trunk is not None:
+            self._unit_goes_on(partial(self._trunk.go_on, saved.trunk))
+
+    def _unit_goes_on(self, go_on: Callable[[], None]) -> None:
+        try:
+            go_on()
+        except ValueError as error:
+            self._refuse(str(error))
+        else:
+            self._counters["memory_gone_on_from"] += 1
+
+    def _refuse(self, reason: str) -> None:
+        self._counters["memory_refused"] += 1
+        self._refusal.append(f"saved state not gone on from: {reason}")
+
+    def remembered(self) -> Saved | None:
+        """What a restart could go on from; None before the first sample."""
+        if self._saved is not None:
+            return None  # what an earlier engine left is still the newest
+        told = {place: boot.remembered() for place, boot in self._boots.items()}
+        boots = {place: boot for place, boot in told.items() if boot is not None}
+        trunk = None if self._trunk is None else self._trunk.remembered()
+        time_ns = newest_ns(boots, trunk)
+        if time_ns is None:
+            return None
+        return Saved(owner=self._owner, time_ns=time_ns, boots=boots, trunk=trunk)
+
+    @cached_property
+    def _owner(self) -> str:
+        return owner_of(self._config, self._identity)
 
     @property
     def _units(self) -> dict[str, Boot | Trunk]:
@@ -89,7 +142,8 @@ class EngineCore:
         wrong = [place for place, boot in self._boots.items() if boot.contradicts_itself]
         notes = [f"silent: {', '.join(silent)}"] if silent else []
         notes += [f"axes or units contradict each other: {', '.join(wrong)}"] if wrong else []
-        return Figures("degraded" if notes else "ok", counters=counters, gauges=gauges, note="; ".join(notes))
+        note = "; ".join(notes + self._refusal)
+        return Figures("degraded" if notes else "ok", counters=counters, gauges=gauges, note=note)
 
     def _is_silent(self, unit: Boot | Trunk) -> bool:
         if self._now_ns is None or unit.newest_ns is None:

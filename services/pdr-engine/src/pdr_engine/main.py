@@ -2,10 +2,14 @@
 
 import msgspec
 
+from bootprint.remembering import Memory, recall
+from bootprint.saved_state import StateFile
 from bootprint.service import Context, Part, Service
 from pdr_engine.config import PdrConfig
 from pdr_engine.engine import BODY, SUBJECTS, EngineCore
 from pdr_engine.foot import warm_up
+from pdr_engine.memory import FILE as STATE_FILE
+from pdr_engine.memory import FORM, SAVE_EVERY_NS, kept_of, owner_of, understood
 from pdr_engine.profile import FILE, EnginePart, load_profile, with_profile
 
 
@@ -15,8 +19,15 @@ def build(context: Context) -> Part:
     config = _with_person(context, computer.section("pdr", PdrConfig))
     if reason := warm_up():
         context.log.warning("numba runs the foot filter in this process, in more memory", reason=reason)
-    core = EngineCore(config, computer.identity, computer.realm.origin)
-    return EnginePart(core, computer.state_dir / FILE)
+    origin = computer.realm.origin
+    if context.lossless:  # a replay at full speed: another time's walk
+        return EnginePart(EngineCore(config, computer.identity, origin), computer.state_dir / FILE)
+    state = StateFile(computer.state_dir / STATE_FILE, FORM)
+    owner = owner_of(config, computer.identity)
+    left = recall(state, lambda kept: understood(kept, owner))
+    core = EngineCore(config, computer.identity, origin, saved=left.value)
+    memory = Memory(state, SAVE_EVERY_NS, lambda: kept_of(core.remembered()), left.refusal)
+    return EnginePart(core, computer.state_dir / FILE, memory)
 
 
 def _with_person(context: Context, config: PdrConfig) -> PdrConfig:

@@ -14,7 +14,7 @@ from bootprint.bus import Envelope
 from bootprint.config import Config
 from bootprint.figures import Figures
 from bootprint.files import write_whole
-from bootprint.service import CorePart
+from bootprint.remembering import Memory, RememberingPart
 from pdr_engine.body import BodySettings
 from pdr_engine.body.azimuth.deviation import Deviation
 from pdr_engine.body.length.personal import Person
@@ -56,40 +56,40 @@ def with_profile(settings: BodySettings, profile: BodyProfile) -> BodySettings:
     return msgspec.structs.replace(settings, length=length, deviations=profile.deviations)
 
 
-class EnginePart(CorePart):
-    """The engine's core with its person's profile saved every minute of event time and at the end."""
+class EnginePart(RememberingPart):
+    """The engine's core, its state saved every few seconds, its person's profile every minute and at the end."""
 
-    def __init__(self, core: EngineCore, path: Path) -> None:
-        super().__init__(core)
+    def __init__(self, core: EngineCore, path: Path, memory: Memory | None = None) -> None:
+        super().__init__(core, memory)
         self._engine, self._path = core, path
-        self._saved_ns: int | None = None
-        self._unsaved = 0
+        self._profiled_ns: int | None = None
+        self._unprofiled = 0
 
     def figures(self) -> Figures:
         """The core's own, and how often the profile could not be saved."""
         figures = super().figures()
-        return replace(figures, counters=figures.counters | {"profile_unsaved": self._unsaved})
+        return replace(figures, counters=figures.counters | {"profile_unsaved": self._unprofiled})
 
     def tick(self, now_ns: int) -> Iterable[Envelope]:
         """Save when it is time."""
-        if self._saved_ns is None or now_ns - self._saved_ns >= SAVE_EVERY_NS:
-            self._saved_ns = now_ns
-            self._save()
+        if self._profiled_ns is None or now_ns - self._profiled_ns >= SAVE_EVERY_NS:
+            self._profiled_ns = now_ns
+            self._save_profile()
         return super().tick(now_ns)
 
     def close(self) -> Iterable[Envelope]:
         """Save, and let the core say its last words."""
-        self._save()
+        self._save_profile()
         return super().close()
 
-    def _save(self) -> None:
+    def _save_profile(self) -> None:
         found = self._engine.person
         if found is None:
             return
         try:
             save_profile(self._path, self._profile(found))
         except OSError:
-            self._unsaved += 1  # a full disk costs the profile, not the soldier
+            self._unprofiled += 1  # a full disk costs the profile, not the soldier
 
     def _profile(self, person: Person) -> BodyProfile:
         return BodyProfile(

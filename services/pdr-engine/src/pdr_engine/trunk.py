@@ -12,7 +12,12 @@ from bootprint.topics import Address
 from pdr_engine.body import BodyNavigator, BodySettings, BodyStepEstimate
 from pdr_engine.body.azimuth.deviation import Deviation
 from pdr_engine.body.length.personal import Person
+from pdr_engine.memory import SavedTrunk
 from pdr_engine.rate import RateMeter
+from pdr_engine.told_again import Had
+from pdr_engine.trunk_record import frozen, thawed
+
+_SAVED = ("_navigator", "_declination_rad", "_frame", "_steps")
 
 
 class Trunk:
@@ -30,6 +35,8 @@ class Trunk:
         self._frame: LocalFrame | None = None
         self._steps = 0
         self._rate = RateMeter()
+        self._had = Had()
+        self._batch = -1  # number of the newest
 
     @property
     def rate_hz(self) -> float:
@@ -47,6 +54,9 @@ class Trunk:
 
     def estimates(self, batch: ImuBatch) -> list[BodyStepEstimate]:
         """The same, with all that the navigator says of the steps."""
+        if not self._had.is_new(batch):
+            return []
+        self._batch = batch.sequence
         times = batch.times
         self._rate.count(int(times[-1]), len(times))
         if self._declination_rad is None:
@@ -73,6 +83,22 @@ class Trunk:
         cosine, sine = math.cos(declination), math.sin(declination)
         east, north = cosine * east - sine * north, cosine * north + sine * east
         self._navigator.hear_fix(fix.time_ns, east, north, fix.horizontal_accuracy_m)
+
+    def remembered(self) -> SavedTrunk | None:
+        """What a restart could go on from; None before the first sample."""
+        if self._rate.newest_ns is None:
+            return None
+        parts = {name: getattr(self, name) for name in _SAVED}
+        return SavedTrunk(record=frozen(parts), newest_ns=self._rate.newest_ns, batch=self._batch)
+
+    def go_on(self, saved: SavedTrunk) -> None:
+        """Be the unit that was saved; ValueError if its record is none."""
+        parts = thawed(saved.record)
+        if set(parts) != set(_SAVED) or not isinstance(parts["_navigator"], BodyNavigator):
+            raise ValueError("no body navigator")
+        for name, part in parts.items():
+            setattr(self, name, part)
+        self._batch, self._had = saved.batch, Had(saved.newest_ns, saved.batch)
 
     @property
     def person(self) -> Person | None:
@@ -103,7 +129,7 @@ class Trunk:
 
     def _message(self, step: BodyStepEstimate) -> BodyStep:
         compass, satellites = step.compass_azimuth_rad, step.satellite_azimuth_rad
-        height, reliability = step.height, step.reliability
+        height, reliability, settled = step.height, step.reliability, step.settled
         return BodyStep(
             time_ns=step.time_ns,
             sequence=self._steps,
@@ -115,6 +141,9 @@ class Trunk:
             motion=step.motion,
             direction=step.direction,
             class_pct=100.0 * step.class_probability,
+            settled_time_ns=None if settled is None else settled.time_ns,
+            settled_motion=None if settled is None else settled.motion,
+            settled_direction=None if settled is None else settled.direction,
             height_m=None if height is None else height.height_m,
             height_sigma_m=None if height is None else height.sigma_m,
             floor=None if height is None else height.floor,

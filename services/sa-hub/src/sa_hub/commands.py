@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from bootprint.cli import group
+from bootprint.commands.keys import KEYS_HELP
 from bootprint.commands.options import Json, write_json
 from sa_hub.history import commands as history_commands
 from sa_hub.page import commands as page_commands
@@ -18,11 +19,10 @@ RADIO_HELP = "Radios: what they cost a sender, and how formats do on them."
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    keys = typer.Typer(help="The group key that the radio's frames are sealed with.", no_args_is_help=True)
+    keys = group(app, "keys", KEYS_HELP)
     keys.command("new")(new)
     keys.command("roll")(roll)
     keys.command("finish")(finish)
-    app.add_typer(keys, name="keys")
     history_commands.register(app)
     page_commands.register(app)
     group(app, "radio", RADIO_HELP).command("profiles")(profiles)
@@ -42,18 +42,21 @@ def roll(
         datetime,
         typer.Option(formats=["%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%S"], help="When senders change over, UTC."),
     ],
+    lost: Annotated[
+        bool, typer.Option("--lost", help="A computer was lost: the old key is refused from then on.")
+    ] = False,
 ) -> None:
-    """Make the key that follows this one; both are accepted until a day after the change."""
+    """Make the key that follows this one; both are accepted until a day after the change, unless one was lost."""
     from sa_hub.keys import create_next_key
 
-    following = create_next_key(path, at)
+    following = create_next_key(path, at, is_lost=lost)
     typer.echo(
         f"next group key in {following}; put it beside the old one everywhere and restart the hubs before {at}Z"
     )
 
 
 def finish(path: KeyFile) -> None:
-    """Put the next key in the old one's place, a day after the change or later."""
+    """Put the next key in the old one's place, when that is accepted no more."""
     from sa_hub.keys import finish_roll
 
     finish_roll(path, time.time())

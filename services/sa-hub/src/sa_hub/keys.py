@@ -1,20 +1,21 @@
 """Group key files: 32 bytes in hexadecimal, for their owner's eyes only, and the next key beside the present one.
 
 ``group.next.key`` beside ``group.key`` holds a second line, ``from 2026-12-01T06:00:00+00:00``: when it takes over.
+A third, ``the old key is lost``, says that the old one is refused from then on.
 """
 
-import os
 import secrets
-import stat
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
 from bootprint.clock import NS_PER_S
 from bootprint.errors import ConfigError
+from bootprint.keys.secret_files import create_secret, next_path, read_secret, replace_secret
 from sa_hub.radio.net_keys import GROUP_KEY_BYTES, OVERLAP_NS, NextKey
 
 _FROM: Final = "from "
+_LOST: Final = "the old key is lost"
 
 
 def load_group_key(path: Path) -> bytes:
@@ -27,7 +28,7 @@ def load_next_key(path: Path) -> NextKey | None:
     following = next_path(path)
     if not following.exists():
         return None
-    key, _, line = _read(following).partition("\n")
+    key, line, *more = [*_read(following).split("\n"), ""]
     try:
         if not line.startswith(_FROM):
             raise ValueError("no second line")
@@ -39,26 +40,22 @@ def load_next_key(path: Path) -> NextKey | None:
         raise ConfigError(
             f"{following}: does not say when it begins ({error}), want `from 2026-12-01T06:00:00+00:00`"
         ) from None
-    return NextKey(_parse(key, following), from_ns)
-
-
-def next_path(path: Path) -> Path:
-    """``group.next.key`` of ``group.key``."""
-    return path.with_name(f"{path.stem}.next{path.suffix}")
+    return NextKey(_parse(key, following), from_ns, 0 if _LOST in more else OVERLAP_NS)
 
 
 def create_group_key(path: Path) -> None:
     """Write a fresh random key, readable by its owner only; ConfigError rather than overwrite anything."""
-    _create(path, secrets.token_hex(GROUP_KEY_BYTES) + "\n")
+    create_secret(path, _text(secrets.token_hex(GROUP_KEY_BYTES)))
 
 
-def create_next_key(path: Path, begins: datetime) -> Path:
-    """Write the key that follows the one in ``path`` from that time on, beside it."""
+def create_next_key(path: Path, begins: datetime, *, is_lost: bool = False) -> Path:
+    """Write the key that follows the one in ``path`` from that time on, beside it; a lost one is refused then."""
     load_group_key(path)
     if begins.tzinfo is None:
         begins = begins.replace(tzinfo=UTC)
     begins_utc = begins.astimezone(UTC).isoformat(timespec="seconds")
-    _create(next_path(path), f"{secrets.token_hex(GROUP_KEY_BYTES)}\n{_FROM}{begins_utc}\n")
+    lines = [secrets.token_hex(GROUP_KEY_BYTES), f"{_FROM}{begins_utc}", *([_LOST] if is_lost else [])]
+    create_secret(next_path(path), _text(*lines))
     return next_path(path)
 
 
@@ -67,31 +64,22 @@ def finish_roll(path: Path, now_s: float) -> None:
     following = load_next_key(path)
     if following is None:
         raise ConfigError(f"{next_path(path)}: there is no next key; `bootprint keys roll {path}` makes one")
-    over_s = (following.from_ns + OVERLAP_NS) // NS_PER_S
+    over_s = (following.from_ns + following.overlap_ns) // NS_PER_S
     if now_s < over_s:
         raise ConfigError(
             f"{path}: is accepted until {datetime.fromtimestamp(over_s, UTC).isoformat()}, finish after that"
         )
-    # First the whole new file, then the replacement: a power cut leaves the old key or the new one.
-    fresh = path.with_name(f"{path.name}.fresh")
-    fresh.unlink(missing_ok=True)
-    _create(fresh, following.group_key.hex() + "\n")
-    fresh.replace(path)
+    replace_secret(path, _text(following.group_key.hex()))
     next_path(path).unlink()
 
 
 def _read(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
-            text = file.read(1024)
-    except OSError as error:
-        raise ConfigError(
-            f"{path}: no group key there ({error.strerror}); `bootprint keys new {path}` makes one"
-        ) from error
-    if mode & 0o077:
-        raise ConfigError(f"{path}: others may read this key (mode {mode:03o}); chmod 600 it")
-    return text.decode("ascii", "replace")
+    data = read_secret(path, "group key", f"`bootprint keys new {path}` makes one")
+    return data.decode("ascii", "replace")
+
+
+def _text(*lines: str) -> bytes:
+    return "".join(f"{line}\n" for line in lines).encode("ascii")
 
 
 def _parse(text: str, path: Path) -> bytes:
@@ -103,17 +91,3 @@ def _parse(text: str, path: Path) -> bytes:
     if len(key) != GROUP_KEY_BYTES:
         raise ConfigError(f"{path}: a key of {len(key)} bytes, {wanted}")
     return key
-
-
-def _create(path: Path, text: str) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-    except FileExistsError:
-        raise ConfigError(f"{path}: exists already; a key is never overwritten, name another file") from None
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
-    with os.fdopen(file, "w", encoding="ascii") as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())

@@ -14,6 +14,7 @@ from bootprint.clock import EventClock
 from bootprint.config import Member
 from bootprint.figures import Figures
 from bootprint.messages import Fix, Track
+from bootprint.rooms import RoomMap
 from bootprint.service import Context, Service
 from sa_hub.assembly import build_hub
 from sa_hub.companions.together import companions_of
@@ -81,7 +82,11 @@ class HubPart:
     def _open(self, profiles: Iterable[LinkProfile]) -> dict[str, Link]:
         computer = self._context.computer
         around = Surroundings(
-            computer.realm.id, computer.member.number, computer.path.parent, self._context.clock.now_ns
+            computer.realm.id,
+            computer.member.number,
+            computer.path.parent,
+            self._context.clock.now_ns,
+            computer.credentials,
         )
         return {each.name: open_link(each, partial(self._arrived, each.name), around) for each in profiles}
 
@@ -130,6 +135,10 @@ class HubPart:
 
     def handle(self, envelope: Envelope) -> list[Envelope]:
         """A message of our own soldier."""
+        if isinstance(envelope.message, RoomMap):
+            if envelope.message.soldier == envelope.address.soldier:  # others' were published by ourselves
+                self._companions.tell([envelope])
+            return []
         outputs = self._core.handle(envelope)
         self._latency.observe(outputs)
         self._companions.tell([envelope])
@@ -217,7 +226,7 @@ def build(context: Context) -> HubPart:
 SERVICE = Service(
     name="sa-hub",
     summary="Keep the squad's picture: tracks, alerts and the radio that carries them.",
-    subjects=("position", "fix", "alert", "observation", "status", "aim"),
+    subjects=("position", "fix", "alert", "observation", "status", "aim", "rooms"),
     build=build,
 )
 

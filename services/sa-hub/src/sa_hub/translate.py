@@ -34,6 +34,7 @@ def report_of_position(
         mode=position.mode,
         floor=position.floor,
         condition=condition,
+        facing_deg=None if position.facing_rad is None else math.degrees(position.facing_rad) % 360.0,
     )
 
 
@@ -48,6 +49,7 @@ def report_of_fix(fix: Fix, number: int, condition: Condition) -> Report:
         height_m=fix.height_m,
         mode="coasting",
         condition=condition,
+        facing_deg=None if fix.azimuth_rad is None else math.degrees(fix.azimuth_rad) % 360.0,
     )
 
 
@@ -71,6 +73,7 @@ def track_of(known: Known, member: Member, held: Held | None, sequence: int) -> 
         north_velocity_m_s=report.north_m_s,
         mode=report.mode,
         floor=report.floor,
+        facing_rad=None if report.facing_deg is None else math.radians(report.facing_deg),
         callsign=member.callsign or None,
         received_ns=known.received_ns,
         via=known.via,

@@ -85,6 +85,11 @@ export function courseOf(track: Track): number | null {
   return (deg(Math.atan2(track.east_velocity_m_s, track.north_velocity_m_s)) + 360) % 360;
 }
 
+/** Degrees clockwise from true north in which the body faces; null where that is not known, or while walking. */
+export function facingOf(track: Track): number | null {
+  return track.facing_rad === null || speedOf(track) >= 0.3 ? null : (deg(track.facing_rad) + 360) % 360;
+}
+
 function deg(angle_rad: number): number {
   return (angle_rad * 180) / Math.PI;
 }

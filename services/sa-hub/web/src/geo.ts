@@ -102,17 +102,27 @@ export interface GridLine {
   vertical: boolean;
 }
 
-/** The lines of the MGRS grid in a view, no more than two dozen across; every tenth is a major one. */
-export function gridLines(west: number, south: number, east: number, north: number): GridLine[] {
+/** Metres between the grid's lines in a view: no more than two dozen across; 0 if that would be too coarse. */
+export function gridSpacing(west: number, south: number, east: number, north: number): number {
+  const [left, right] = extent(west, south, east, north);
+  return [10, 100, 1000, 10_000, 100_000].find((each) => (right - left) / each <= 24) ?? 0;
+}
+
+/** The lines of the MGRS grid within bounds; every tenth is a major one. */
+export function gridLines(west: number, south: number, east: number, north: number, spacing: number): GridLine[] {
+  const zone = zoneOf((west + east) / 2);
+  const [left, right, low, high] = extent(west, south, east, north);
+  return [...family(left, right, spacing, (at) => along(low, high, (y) => fromUtm([at, y], zone)), true),
+    ...family(low, high, spacing, (at) => along(left, right, (x) => fromUtm([x, at], zone)), false)];
+}
+
+/** Least and greatest easting and northing within bounds. */
+function extent(west: number, south: number, east: number, north: number): [left: number, right: number, low: number, high: number] {
   const zone = zoneOf((west + east) / 2);
   const corners = [[west, south], [east, south], [west, north], [east, north]].map((each) => toUtm(each as Place, zone));
   const eastings = corners.map((each) => each[0]);
   const northings = corners.map((each) => each[1]);
-  const [left, right, low, high] = [Math.min(...eastings), Math.max(...eastings), Math.min(...northings), Math.max(...northings)];
-  const spacing = [10, 100, 1000, 10_000, 100_000].find((each) => (right - left) / each <= 24) ?? 0;
-  if (spacing === 0) return [];
-  return [...family(left, right, spacing, (at) => along(low, high, (y) => fromUtm([at, y], zone)), true),
-    ...family(low, high, spacing, (at) => along(left, right, (x) => fromUtm([x, at], zone)), false)];
+  return [Math.min(...eastings), Math.max(...eastings), Math.min(...northings), Math.max(...northings)];
 }
 
 function family(from: number, to: number, spacing: number, points: (at: number) => Place[], vertical: boolean): GridLine[] {

@@ -8,6 +8,7 @@ import type { Theme } from "./layers.ts";
 import { get, listen, post, Refusal } from "./link.ts";
 import { SquadMap } from "./map.ts";
 import { floorsOf, withFloors } from "./plan.ts";
+import { Rooms } from "./rooms.ts";
 import { Roster } from "./roster.ts";
 import { Side } from "./side.ts";
 import { State, TRAIL_S } from "./state.ts";
@@ -15,11 +16,21 @@ import "./style.css";
 import { Timeline } from "./timeline.ts";
 import { Tools } from "./tools.ts";
 import type { Post, Soldier } from "./types.ts";
-import { ask, at, h, replaceIfNew, toast } from "./ui.ts";
+import { ask, at, h, replaceIfNew, showKeys, toast } from "./ui.ts";
 
 const CLOCK_MS = 250;
 const MOST_MS = 1000;
-const KEYS = "1 … 9 floor · 0 all floors · F everybody · C centre · G follow · O observe · B bearing · X fix · M measure · L alert · A acknowledge · T trails · N day or night · / find · space play · Home live";
+const KEYS: [key: string, what: string][] = [
+  ["1 … 9", "a floor, from the lowest up"], ["0", "all floors"],
+  ["F", "show everybody"], ["C", "centre on the selected soldier"],
+  ["G", "follow the selected soldier"], ["/", "find somebody"],
+  ["O", "observation at a place"], ["B", "observation by bearing and range"],
+  ["X", "say where the selected soldier is"], ["M", "measure"],
+  ["L", "alert everybody"], ["A", "acknowledge the newest alert"],
+  ["T", "trails on or off"], ["N", "day or night"],
+  ["Space", "play or pause the past"], ["Home", "back to now"],
+  ["Esc", "leave a tool, or the selection"], ["?", "these keys"],
+];
 
 async function signedIn(): Promise<Post> {
   for (;;) {
@@ -36,6 +47,7 @@ async function signedIn(): Promise<Post> {
 class Page {
   readonly state: State;
   readonly map: SquadMap;
+  private readonly rooms: Rooms;
   private readonly roster: Roster;
   private readonly side: Side;
   private readonly alerts: Alerts;
@@ -48,14 +60,15 @@ class Page {
     this.state = state;
     document.documentElement.dataset.theme = this.theme;
     this.map = new SquadMap("map", state, this.theme);
+    this.rooms = new Rooms(state, this.map);
     this.roster = new Roster(state, (soldier) => this.select(soldier, true));
-    this.side = new Side(state, (seen) => this.map.map.easeTo({ center: [seen.longitude_deg, seen.latitude_deg], zoom: 19 }));
+    this.side = new Side(state, (seen) => this.map.show([seen.longitude_deg, seen.latitude_deg], 19));
     this.alerts = new Alerts(state, (soldier) => this.select(soldier, true));
     this.tools = new Tools(state, this.map);
     this.timeline = new Timeline(state, () => this.draw());
     this.buildTop();
     this.bind();
-    if (state.post.has_basemap) void this.map.addBasemap().catch(() => toast("the basemap cannot be read", true));
+    if (state.post.basemap !== null) void this.map.addBasemap(state.post.basemap).catch(() => toast("the basemap cannot be read", true));
   }
 
   async begin(): Promise<void> {
@@ -65,13 +78,12 @@ class Page {
     if (this.state.post.has_history) void this.recall().catch(() => undefined); // trails are a convenience
     listen((news, whole) => {
       this.state.take(news, whole);
-      if (whole || Object.keys(news.observations).length) this.map.drawObservations();
+      void this.rooms.take(news).catch(() => undefined); // told again when it grows
       if (Object.keys(news.alerts).length) this.alerts.draw(); // these do not wait for the beat
     }, (line) => {
       this.state.line = line;
       this.drawTop();
     });
-    this.map.map.on("load", () => this.map.drawObservations());
     this.beat();
   }
 
@@ -93,6 +105,7 @@ class Page {
   private draw(): void {
     this.state.look();
     this.map.draw();
+    this.rooms.draw();
     if (!this.fitted && this.state.tracks.size > 0 && this.map.ready) {
       this.fitted = true;
       this.map.fit();
@@ -136,7 +149,7 @@ class Page {
       h("button", { id: "side-toggle", title: "Radio and health", onclick: () => this.toggleSide() }, icon("side")),
       h("button", { id: "sound", title: "Sound of alerts", onclick: () => this.toggleSound() }, icon(this.alerts.sound ? "sound-on" : "sound-off")),
       h("button", { id: "theme", title: "Day or night (N)", onclick: () => this.toggleTheme() }, icon("theme")),
-      h("button", { id: "keys", title: KEYS, onclick: () => toast(KEYS) }, icon("keys")),
+      h("button", { id: "keys", title: "Keys (?)", "aria-label": "Keys", onclick: () => showKeys(KEYS) }, icon("keys")),
     );
   }
 
@@ -149,7 +162,7 @@ class Page {
   }
 
   private drawFloors(): void {
-    const floors = [...new Set([...floorsOf(this.map.plan), ...this.state.floorsInUse()])].sort((a, b) => b - a);
+    const floors = [...new Set([...floorsOf(this.map.plan), ...this.rooms.floors(), ...this.state.floorsInUse()])].sort((a, b) => b - a);
     const counts = new Map<number, number>();
     for (const each of this.state.seen()) if (each.track.floor !== null) counts.set(each.track.floor, (counts.get(each.track.floor) ?? 0) + 1);
     at("floors").hidden = floors.length === 0;
@@ -185,13 +198,18 @@ class Page {
     const map = this.map.map;
     map.on("click", (event) => {
       if (this.tools.click([event.lngLat.lng, event.lngLat.lat])) return;
-      const box: [[number, number], [number, number]] = [[event.point.x - 8, event.point.y - 8], [event.point.x + 8, event.point.y + 8]];
-      const hit = map.queryRenderedFeatures(box, { layers: ["soldiers"] })[0];
-      this.select(hit ? String(hit.properties.id) : null);
+      this.select(this.soldierAt(event.point));
     });
     map.on("dragstart", () => (this.state.following = false));
-    map.on("mousemove", (event) => (at("readout").textContent = mgrs([event.lngLat.lng, event.lngLat.lat])));
+    map.on("mousemove", (event) => {
+      at("readout").textContent = mgrs([event.lngLat.lng, event.lngLat.lat]);
+      if (this.state.tool === "select") map.getCanvas().style.cursor = this.soldierAt(event.point) === null ? "" : "pointer";
+    });
     document.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  private soldierAt({ x, y }: { x: number; y: number }): string | null {
+    return this.map.overlay.pick([x, y], (id) => this.state.tracks.has(id) || this.state.past?.tracks.has(id) === true);
   }
 
   private key(event: KeyboardEvent): void {
@@ -206,7 +224,7 @@ class Page {
       o: () => this.tools.choose("observe"), b: () => this.tools.choose("bearing"), x: () => this.tools.choose("fix"), m: () => this.tools.choose("measure"),
       l: () => this.tools.choose("alert"), t: () => this.tools.choose("trails"), a: () => void this.alerts.acknowledge(), n: () => this.toggleTheme(),
       "/": () => at("find").focus(), " ": () => this.state.post.has_history && this.timeline.toggle(), home: () => this.timeline.live(),
-      escape: () => (this.state.tool === "select" ? this.select(null) : this.tools.choose("select")), "?": () => toast(KEYS),
+      escape: () => (this.state.tool === "select" ? this.select(null) : this.tools.choose("select")), "?": () => showKeys(KEYS),
     };
     const action = keys[event.key.toLowerCase()];
     if (!action) return;

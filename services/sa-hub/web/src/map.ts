@@ -1,33 +1,42 @@
-// The map: grid or basemap, buildings, trails, doubt, soldiers, things seen. Everything lies in GeoJSON sources.
+// The map: grid or basemap and buildings as MapLibre draws them, and the overlay of everything that moves.
 
-import { Map as MapLibre, addProtocol, setWorkerUrl, type GeoJSONSource, type StyleSpecification } from "maplibre-gl";
+import { Map as MapLibre, addProtocol, setWorkerUrl, type GeoJSONSource, type LayerSpecification, type StyleSpecification } from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?worker&url";
 import "maplibre-gl/dist/maplibre-gl.css";
-import { Protocol, PMTiles } from "pmtiles";
-import { courseOf, duration, speedOf } from "./display.ts";
-import { gridLines, moved } from "./geo.ts";
-import { BASEMAP, layers, PALETTE, type Theme } from "./layers.ts";
+import { Protocol } from "pmtiles";
+import { basemapLayers, basemapOf, type Basemap } from "./basemap.ts";
+import { Grid, type Bounds } from "./grid.ts";
+import { layers, type Theme } from "./layers.ts";
+import { marksOf, trailsOf } from "./marks.ts";
+import { Overlay, type Draft } from "./overlay.ts";
+import { ROOMS_SOURCE } from "./rooms.ts";
 import type { State } from "./state.ts";
-import { addArrow, foreignIcon, observationIcon, soldierIcon } from "./symbols.ts";
 import type { Place } from "./types.ts";
+import { afterPaint } from "./ui.ts";
+import { View } from "./view.ts";
 
 type Feature = GeoJSON.Feature;
-const CROWD = 100; // more are drawn without names, circles and trails from afar, or nothing could be read
-const CROWD_ZOOM = 17.5;
-const AHEAD_S = 5; // of the line that shows speed
-const SOURCES = ["grid", "grid-labels", "plan", "trails", "doubt", "vectors", "since", "foreign", "soldiers", "observations", "draft"];
+const SOURCES = ["grid", "plan", ROOMS_SOURCE];
+const FIT_PX = { top: 90, bottom: 130, left: 130, right: 110 }; // names stay clear of tools, floors and timeline
+const FIGURES_PX = { right: 6, low: 76 }; // above the timeline
 
 export class SquadMap {
   readonly map: MapLibre;
+  readonly overlay: Overlay;
   plan: Feature[] = [];
-  private readonly state: State;
   ready = false;
+  private readonly state: State;
+  private readonly grid = new Grid();
+  private theme: Theme;
+  private basemap: Basemap | null = null;
+  private draft: Draft = { places: [], ring: false, text: "" };
   private planFloor: number | null = null;
-  private followed: Place | null = null;
+  private readonly bySoftware: boolean;
 
   constructor(container: string, state: State, theme: Theme) {
     setWorkerUrl(workerUrl);
     this.state = state;
+    this.theme = theme;
     this.map = new MapLibre({
       container,
       style: style(theme),
@@ -41,101 +50,62 @@ export class SquadMap {
       dragRotate: false,
     });
     this.map.touchZoomRotate.disableRotation();
+    this.bySoftware = isDrawnBySoftware(this.map.getCanvas());
+    this.overlay = new Overlay(theme, this.bySoftware);
+    this.map.getCanvasContainer().append(this.overlay.canvas);
     this.map.on("load", () => {
       this.ready = true;
-      this.drawGrid();
       this.draw();
     });
-    this.map.on("styledata", () => this.addArrows());
-    this.map.on("move", () => this.drawGrid());
+    this.map.on("render", () => this.drawOverlay());
   }
 
-  async addBasemap(): Promise<void> {
-    const protocol = new Protocol();
-    addProtocol("pmtiles", protocol.tile);
-    const address = new URL("basemap", document.baseURI).href;
-    const header = await new PMTiles(address).getHeader();
+  async addBasemap(kind: "pmtiles" | "mbtiles"): Promise<void> {
+    addProtocol("pmtiles", new Protocol().tile);
+    const basemap = await basemapOf(kind);
     await new Promise<void>((resolve) => (this.ready ? resolve() : void this.map.once("load", () => resolve())));
-    const raster = header.tileType > 1;
-    this.map.addSource("basemap", { type: raster ? "raster" : "vector", url: `pmtiles://${address}`, ...(raster ? { tileSize: 256 } : {}) });
-    for (const layer of BASEMAP(raster)) this.map.addLayer(layer, "grid");
+    this.basemap = basemap;
+    this.map.addSource("basemap", basemap.source);
+    for (const layer of basemapLayers(basemap, this.theme)) this.map.addLayer(layer, "grid");
   }
 
   setTheme(theme: Theme): void {
-    for (const layer of layers(theme)) {
-      if (layer.id === "names") this.map.setLayoutProperty("names", "text-field", layer.layout!["text-field" as keyof typeof layer.layout]);
+    this.theme = this.overlay.theme = theme;
+    const all: LayerSpecification[] = [...layers(theme), ...(this.basemap ? basemapLayers(this.basemap, theme) : [])];
+    for (const layer of all) {
       for (const [name, value] of Object.entries(layer.paint ?? {})) this.map.setPaintProperty(layer.id, name as Parameters<MapLibre["setPaintProperty"]>[1], value);
     }
   }
 
-  /** Draw what has changed since the last time: soldiers always, the plan when another floor is looked at. */
+  /** Draw what has changed since the last time: what moves always, the plan when another floor is looked at. */
   draw(): void {
     if (!this.ready) return;
-    const seen = this.state.seen().filter((each) => each.track.mode !== "unplaced");
-    const crowded = seen.length > CROWD && this.map.getZoom() < CROWD_ZOOM;
-    const [soldiers, doubt, vectors, since]: [Feature[], Feature[], Feature[], Feature[]] = [[], [], [], []];
-    for (const each of seen) {
-      const { track, shown, soldier } = each;
-      const selected = this.state.selected === track.soldier;
-      const here = this.state.floor === null || track.floor === null || track.floor === this.state.floor;
-      const course = courseOf(track);
-      const properties = {
-        id: track.soldier,
-        icon: soldierIcon(this.map, soldier, shown.state, selected),
-        name: crowded && shown.state === "fresh" && !selected ? "" : soldier.callsign + (this.state.floor === null && track.floor !== null ? `  ⌂${track.floor}` : ""),
-        words: shown.state === "fresh" ? (selected ? shown.words : "") : shown.words,
-        state: shown.state,
-        opacity: (here ? 1 : 0.22) * fading(shown.state, shown.age_s, this.state.ages.lost_s),
-        label: here ? 1 : 0.3,
-        arrow: course === null || shown.state === "lost" ? "" : `arrow-${shown.state}`,
-        course: course ?? 0,
-        rank: soldier.number,
-      };
-      soldiers.push(point(shown.place, properties));
-      if (!crowded || selected) doubt.push(point(shown.place, { radius_m: shown.radius_95_m, equator_m: shown.radius_95_m / Math.cos((shown.place[1] * Math.PI) / 180), state: shown.state, opacity: here ? 1 : 0.2 }));
-      const speed = speedOf(track);
-      if (!crowded && speed >= 0.3 && here && shown.state !== "lost") {
-        const ahead = moved(shown.place, track.east_velocity_m_s * AHEAD_S, track.north_velocity_m_s * AHEAD_S);
-        vectors.push(line([shown.place, ahead], { state: shown.state }));
-      }
-      if (shown.state !== "fresh" && here) {
-        since.push(line([[track.longitude_deg, track.latitude_deg], shown.place], { state: shown.state }));
-      }
-      if (selected && this.state.following) this.follow(shown.place);
-    }
-    this.set("soldiers", soldiers);
-    this.set("doubt", doubt);
-    this.set("vectors", vectors);
-    this.set("since", since);
-    this.set("trails", this.state.trailsOn && this.state.past === null ? this.trails() : []);
-    this.drawForeign();
     this.drawPlan();
+    this.follow();
+    this.drawOverlay();
   }
 
-  drawObservations(): void {
+  private drawOverlay(): void {
     if (!this.ready) return;
-    const views = [...this.state.observations.values()];
-    this.set("observations", views.map((each) => point([each.longitude_deg, each.latitude_deg], {
-      id: each.id,
-      icon: observationIcon(this.map, each.code),
-      name: [each.code?.replaceAll("_", " "), each.text].filter(Boolean).join(": "),
-      equator_m: (2.45 * each.accuracy_m) / Math.cos((each.latitude_deg * Math.PI) / 180),
-    })));
+    const { lng, lat } = this.map.getCenter();
+    const { clientWidth, clientHeight } = this.map.getContainer();
+    const view = new View([lng, lat], this.map.getZoom(), clientWidth, clientHeight);
+    const bounds = this.bounds();
+    if (this.grid.cover(bounds)) this.set("grid", this.grid.lines.map((each) => line(each.points, { major: each.major })));
+    const corner = this.map.unproject([clientWidth - FIGURES_PX.right, clientHeight - FIGURES_PX.low]);
+    const figures = this.grid.figures(corner.lat, corner.lng).map(({ text, place }) => ({ text, at: view.toScreen(place) }));
+    this.overlay.draw(view, marksOf(this.state, this.map.getZoom(), this.theme), trailsOf(this.state), figures, this.draft);
   }
 
-  private drawForeign(): void {
-    const views = this.state.past === null ? [...this.state.foreign.values()] : [];
-    this.set("foreign", views.map((each) => point([each.longitude_deg, each.latitude_deg], {
-      id: each.uid,
-      icon: foreignIcon(this.map, each.affiliation),
-      name: `${each.callsign ?? each.uid}${each.stale_s < this.state.now_s ? `\nstale for ${duration(this.state.now_s - each.stale_s)}` : ""}`,
-      opacity: each.stale_s < this.state.now_s ? 0.5 : 1,
-    })));
+  private bounds(): Bounds {
+    const found = this.map.getBounds();
+    return { west: found.getWest(), south: found.getSouth(), east: found.getEast(), north: found.getNorth() };
   }
 
   /** What a tool is about to place: lines, points and their labels. */
-  drawDraft(features: Feature[]): void {
-    this.set("draft", features);
+  drawDraft(draft: Draft): void {
+    this.draft = draft;
+    this.drawOverlay();
   }
 
   /** Show everybody who is not lost (but all if all are), and the buildings they may be in. */
@@ -149,30 +119,33 @@ export class SquadMap {
     if (places.length === 0) return;
     const [longitudes, latitudes] = [places.map((each) => each[0]), places.map((each) => each[1])];
     const bounds: [number, number, number, number] = [Math.min(...longitudes), Math.min(...latitudes), Math.max(...longitudes), Math.max(...latitudes)];
-    this.map.fitBounds(bounds, { padding: 90, maxZoom: 20, duration: 500 });
+    this.map.fitBounds(bounds, { padding: FIT_PX, maxZoom: 20, duration: this.lasting(500) });
   }
 
   centre(soldier: string): void {
     const found = this.state.seen().find((each) => each.track.soldier === soldier);
-    if (found) this.map.easeTo({ center: found.shown.place, zoom: Math.max(this.map.getZoom(), 18), duration: 400 });
+    if (found) this.show(found.shown.place, 18);
   }
 
-  private follow(place: Place): void {
-    const still = this.followed && Math.abs(this.followed[0] - place[0]) + Math.abs(this.followed[1] - place[1]) < 1e-7;
-    if (still || this.map.isMoving()) return;
-    this.followed = place;
-    this.map.easeTo({ center: place, duration: 240 });
+  /** Bring a place to the middle, and near enough. */
+  show(place: Place, zoom: number): void {
+    const move = () => this.map.easeTo({ center: place, zoom: Math.max(this.map.getZoom(), zoom), duration: this.lasting(400) });
+    if (this.bySoftware) afterPaint(move);
+    else move();
   }
 
-  private trails(): Feature[] {
-    const features: Feature[] = [];
-    const crowd = this.state.trails.size > CROWD;
-    for (const [soldier, trail] of this.state.trails) {
-      if (crowd && soldier !== this.state.selected) continue;
-      const points = trail.filter((each) => this.state.floor === null || each.floor === null || each.floor === this.state.floor);
-      if (points.length > 1) features.push(line(points.map((each) => each.place), { id: soldier, selected: this.state.selected === soldier }));
-    }
-    return features;
+  /** Keep the selected soldier in the middle, if that is wanted. */
+  private follow(): void {
+    if (!this.state.following || this.map.isMoving()) return;
+    const place = this.state.seen().find((each) => each.track.soldier === this.state.selected)?.shown.place;
+    if (place === undefined) return;
+    const [at, { clientWidth, clientHeight }] = [this.map.project(place), this.map.getContainer()];
+    if (Math.hypot(at.x - clientWidth / 2, at.y - clientHeight / 2) >= 1) this.map.easeTo({ center: place, duration: this.lasting(240) });
+  }
+
+  /** How long a movement of the map may last: without graphics hardware each of its frames takes too long. */
+  private lasting(wanted_ms: number): number {
+    return this.bySoftware ? 0 : wanted_ms;
   }
 
   private drawPlan(): void {
@@ -186,48 +159,16 @@ export class SquadMap {
     this.set("plan", features);
   }
 
-  private drawGrid(): void {
-    if (!this.ready) return;
-    const view = this.map.getBounds();
-    const [west, south, east, north] = [view.getWest(), view.getSouth(), view.getEast(), view.getNorth()];
-    if (Math.abs(north) > 83 || Math.abs(south) > 83 || east - west > 40) {
-      this.set("grid", []);
-      this.set("grid-labels", []);
-      return;
-    }
-    const lines = gridLines(west, south, east, north);
-    this.set("grid", lines.map((each) => line(each.points, { major: each.major })));
-    this.set("grid-labels", lines.map((each) => point(each.vertical ? edge(each.points, 1, south + (north - south) * 0.012) : edge(each.points, 0, east - (east - west) * 0.012), { text: each.label })));
-  }
-
   private set(source: string, features: Feature[]): void {
     (this.map.getSource(source) as GeoJSONSource | undefined)?.setData({ type: "FeatureCollection", features });
   }
-
-  private addArrows(): void {
-    for (const state of ["fresh", "stale"] as const) {
-      if (!this.map.hasImage(`arrow-${state}`)) addArrow(this.map, `arrow-${state}`, PALETTE[state]);
-    }
-  }
 }
 
-/** Where a line meets a parallel (axis 1) or a meridian (axis 0) at the edge of the view. */
-function edge(points: Place[], axis: 0 | 1, value: number): Place {
-  for (let index = 1; index < points.length; index++) {
-    const [from, to] = [points[index - 1]!, points[index]!];
-    const share = (value - from[axis]) / (to[axis] - from[axis]);
-    if (share >= 0 && share <= 1) return [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])];
-  }
-  return points[0]!;
-}
-
-/** Known long ago is fainter; somebody lost stays readable. */
-function fading(state: string, age_s: number, lost_s: number): number {
-  return state === "fresh" ? 1 : Math.max(0.7, 1 - (0.3 * age_s) / lost_s);
-}
-
-function point(coordinates: Place, properties: Record<string, unknown>): Feature {
-  return { type: "Feature", geometry: { type: "Point", coordinates }, properties };
+/** Whether the processor only imitates graphics hardware. */
+function isDrawnBySoftware(canvas: HTMLCanvasElement): boolean {
+  const gl = canvas.getContext("webgl2");
+  const info = gl?.getExtension("WEBGL_debug_renderer_info");
+  return info != null && /swiftshader|llvmpipe|softpipe|basic render/i.test(String(gl!.getParameter(info.UNMASKED_RENDERER_WEBGL)));
 }
 
 function line(coordinates: Place[], properties: Record<string, unknown>): Feature {

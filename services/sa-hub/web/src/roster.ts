@@ -85,7 +85,7 @@ export function lineOf(seen: Seen, condition: string): string {
     condition.toUpperCase(),
     MODES[track.mode] ?? track.mode,
     trust === "none" ? "" : `${trust} ±${shown.radius_95_m < 10 ? shown.radius_95_m.toFixed(1) : shown.radius_95_m.toFixed(0)} m`,
-    track.floor === null ? "" : `floor ${track.floor}`,
+    track.floor === null ? "" : `⌂${track.floor}`,
     speedOf(track) < 0.3 ? "" : `${speedOf(track).toFixed(1)} m/s`,
     status?.battery_pct === null || status?.battery_pct === undefined ? "" : `battery ${status.battery_pct.toFixed(0)} %`,
   ].filter(Boolean).join(" · ");

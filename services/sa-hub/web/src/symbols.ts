@@ -1,10 +1,10 @@
-// MIL-STD-2525 symbols of dismounted soldiers and of things seen, drawn by milsymbol onto the map's images.
+// MIL-STD-2525 symbols of dismounted soldiers and of things seen, drawn by milsymbol onto small canvases.
 
-import type { Map as MapLibre } from "maplibre-gl";
 import ms from "milsymbol";
 import type { Soldier, TrackState } from "./types.ts";
 
-const PIXELS = Math.min(2, Math.max(1, window.devicePixelRatio));
+/** Of a picture to a CSS pixel. */
+export const PIXELS = Math.min(2, Math.max(1, window.devicePixelRatio));
 
 /** Entities of symbol set 27 (dismounted individual) by role; a plain rifleman for what is not known. */
 const ENTITY: Record<string, string> = {
@@ -36,6 +36,7 @@ const SEEN: Record<string, [affiliation: string, set: string, entity: string]> =
   mine: ["6", "15", "210100"],
   civilian: ["4", "11", "110000"],
   casualty: ["3", "27", "110212"],
+  friendly: ["3", "10", "000000"],
 };
 
 /** Marks of plain places, drawn as letters in a square: there is no symbol that everybody reads. */
@@ -56,28 +57,37 @@ export function sidc(soldier: Soldier): string {
   return `10032700001${(ENTITY[soldier.role] ?? ENTITY.rifleman!).slice(1)}0000`;
 }
 
-/** The name of the map's image of a soldier in a state; drawn once for all of the same role. */
-export function soldierIcon(map: MapLibre, soldier: Soldier, state: TrackState, selected: boolean): string {
-  const name = `soldier:${soldier.role}:${state}:${selected ? 1 : 0}`;
-  if (!map.hasImage(name)) {
-    const options = { size: 26, fillColor: FRIEND[state], outlineColor: selected ? "#ffffff" : "#0b1118", outlineWidth: selected ? 7 : 3 };
-    add(map, name, symbolCanvas(sidc(soldier), options));
-  }
-  return name;
+/** A drawn symbol: its picture, its size in CSS pixels, and where in it the place is that it stands for. */
+export interface Symbol {
+  picture: HTMLCanvasElement;
+  width: number;
+  height: number;
+  anchor: [x: number, y: number];
 }
 
-export function observationIcon(map: MapLibre, code: string | null): string {
-  const name = `seen:${code ?? "text"}`;
-  if (!map.hasImage(name)) add(map, name, observationCanvas(code, 24));
-  return name;
+const drawn = new Map<string, Symbol>();
+
+/** The symbol of a soldier in a state; drawn once for all of the same role. */
+export function soldierSymbol(soldier: Soldier, state: TrackState, selected: boolean): Symbol {
+  const options = { size: 26, fillColor: FRIEND[state], outlineColor: selected ? "#ffffff" : "#0b1118", outlineWidth: selected ? 7 : 3 };
+  return once(`soldier:${soldier.role}:${state}:${selected}`, () => symbolOf(sidc(soldier), options));
 }
 
-/** The image of a unit of another system, by its affiliation. */
-export function foreignIcon(map: MapLibre, affiliation: string): string {
-  const name = `foreign:${affiliation}`;
+/** The symbol of a thing seen. */
+export function observationSymbol(code: string | null): Symbol {
+  return once(`seen:${code}`, () => middled(observationCanvas(code, 24)));
+}
+
+/** The symbol of a unit of another system, by its affiliation. */
+export function foreignSymbol(affiliation: string): Symbol {
   const digit = { friend: "3", hostile: "6", neutral: "4" }[affiliation] ?? "1";
-  if (!map.hasImage(name)) add(map, name, symbolCanvas(`100${digit}10000000000000`, { size: 22, outlineColor: "#0b1118", outlineWidth: 3 }));
-  return name;
+  return once(`foreign:${digit}`, () => symbolOf(`100${digit}10000000000000`, { size: 22, outlineColor: "#0b1118", outlineWidth: 3 }));
+}
+
+function once(name: string, draw: () => Symbol): Symbol {
+  const found = drawn.get(name) ?? draw();
+  drawn.set(name, found);
+  return found;
 }
 
 export function observationCanvas(code: string | null, size: number): HTMLCanvasElement {
@@ -90,26 +100,23 @@ export function soldierCanvas(soldier: Soldier, state: TrackState, size: number)
   return symbolCanvas(sidc(soldier), { size, fillColor: FRIEND[state], outlineColor: "#0b1118", outlineWidth: 3 });
 }
 
-/** A triangle that points up, for headings. */
-export function addArrow(map: MapLibre, name: string, colour: string): void {
-  const [canvas, pen] = blank(18, 60);
-  pen.beginPath();
-  pen.moveTo(9, 1);
-  pen.lineTo(16, 13);
-  pen.lineTo(9, 10);
-  pen.lineTo(2, 13);
-  pen.closePath();
-  pen.fillStyle = colour;
-  pen.strokeStyle = "#0b1118";
-  pen.lineWidth = 1.5;
-  pen.fill();
-  pen.stroke();
-  add(map, name, canvas);
+function symbolCanvas(code: string, options: Record<string, unknown>): HTMLCanvasElement {
+  return milsymbol(code, options).asCanvas() as HTMLCanvasElement;
 }
 
-function symbolCanvas(code: string, options: Record<string, unknown>): HTMLCanvasElement {
-  const size = Number(options.size) * PIXELS;
-  return new ms.Symbol(code, { ...options, size }).asCanvas() as HTMLCanvasElement;
+function symbolOf(code: string, options: Record<string, unknown>): Symbol {
+  const symbol = milsymbol(code, options);
+  const { x, y } = symbol.getAnchor();
+  return { ...middled(symbol.asCanvas() as HTMLCanvasElement), anchor: [x / PIXELS, y / PIXELS] };
+}
+
+function middled(picture: HTMLCanvasElement): Symbol {
+  const [width, height] = [picture.width / PIXELS, picture.height / PIXELS];
+  return { picture, width, height, anchor: [width / 2, height / 2] };
+}
+
+function milsymbol(code: string, options: Record<string, unknown>) {
+  return new ms.Symbol(code, { ...options, size: Number(options.size) * PIXELS });
 }
 
 function letterCanvas(text: string, size: number): HTMLCanvasElement {
@@ -137,9 +144,4 @@ function blank(width: number, height: number): [HTMLCanvasElement, CanvasRenderi
   const pen = canvas.getContext("2d")!;
   pen.scale(PIXELS, PIXELS);
   return [canvas, pen];
-}
-
-function add(map: MapLibre, name: string, canvas: HTMLCanvasElement): void {
-  const pixels = canvas.getContext("2d")!.getImageData(0, 0, canvas.width, canvas.height);
-  map.addImage(name, pixels, { pixelRatio: PIXELS });
 }

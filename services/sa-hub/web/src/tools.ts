@@ -89,16 +89,12 @@ export class Tools {
     const start = this.state.tool === "bearing" ? this.selectedPlace() : null;
     const points = [...(start ? [start] : this.points), ...(pointer ? [pointer] : [])];
     const total = points.slice(1).reduce((sum, each, index) => sum + distance_m(points[index]!, each), 0);
-    const features: GeoJSON.Feature[] = points.map((each, index) => ({
-      type: "Feature", geometry: { type: "Point", coordinates: each },
-      properties: { text: index > 0 && index === points.length - 1 ? legend(points[index - 1]!, each, total) : "" },
-    }));
-    if (points.length > 1) features.push({ type: "Feature", geometry: { type: "LineString", coordinates: points }, properties: {} });
-    this.map.drawDraft(features);
+    const text = points.length > 1 ? legend(points.at(-2)!, points.at(-1)!, total) : "";
+    this.map.drawDraft({ places: points, ring: false, text });
   }
 
   private async observe(place: Place): Promise<void> {
-    this.map.drawDraft([{ type: "Feature", geometry: { type: "LineString", coordinates: circle(place, 10) }, properties: {} }]);
+    this.map.drawDraft({ places: circle(place, 10), ring: true, text: "" });
     const asked = await ask("Observation", [...this.what(), { name: "accuracy_m", label: "Accuracy, m (1 σ)", value: 10, kind: "number" }], "Send", mgrs(place));
     this.draft();
     if (!asked) return;

@@ -27,6 +27,7 @@ export interface Track {
   received_s: number | null;
   held_m: number | null;
   held_s: number | null;
+  facing_rad: number | null;
 }
 
 export interface Foreign {
@@ -115,6 +116,7 @@ export interface Picture {
   links: Record<string, Link>;
   health: Record<string, Health>;
   warnings: Record<string, Warning>;
+  rooms: Record<string, { time_s: number; soldier: string; floors: number[] }>;
 }
 
 export interface Post {
@@ -126,7 +128,7 @@ export interface Post {
   stale_s: number;
   lost_s: number;
   has_plan: boolean;
-  has_basemap: boolean;
+  basemap: "pmtiles" | "mbtiles" | null;
   has_history: boolean;
   alert_kinds: string[];
   codes: string[];

@@ -55,6 +55,16 @@ export function ask(title: string, fields: Field[], button: string, note = ""): 
   });
 }
 
+/** Say which key does what, until any is pressed. */
+export function showKeys(keys: [key: string, what: string][]): void {
+  const dialog = h("dialog", { onclose: () => dialog.remove(), onkeydown: () => dialog.close() },
+    h("h2", {}, "Keys"),
+    h("div", { class: "keys" }, ...keys.flatMap(([key, what]) => [h("kbd", {}, key), h("span", {}, what)])),
+    h("form", { method: "dialog", class: "buttons" }, h("button", { class: "primary" }, "Close")));
+  document.body.append(dialog);
+  dialog.showModal();
+}
+
 function input(field: Field): HTMLInputElement | HTMLSelectElement {
   if (field.options) {
     const select = h("select", { name: field.name }, ...field.options.map(([value, label]) => h("option", { value, selected: value === field.value }, label)));
@@ -73,6 +83,11 @@ export function toast(text: string, bad = false): void {
   element.className = bad ? "bad shown" : "shown";
   clearTimeout(toastTimer);
   toastTimer = window.setTimeout(() => (element.className = ""), bad ? 7000 : 3500);
+}
+
+/** Do what takes long when what answers a person is on the screen. */
+export function afterPaint(job: () => void): void {
+  requestAnimationFrame(() => setTimeout(job));
 }
 
 /** Replace an element's children only if their text would change: hovering and focus survive. */

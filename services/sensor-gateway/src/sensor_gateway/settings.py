@@ -83,13 +83,15 @@ class ReplaySource(Device, frozen=True, kw_only=True, tag_field="kind", tag="rep
 
     ``run`` chooses one of several runs, ``soldier`` one of several soldiers of an MCAP file (default: this
     computer's own). ``start_time_s`` is the UTC second at which the recording's time zero is played; without it
-    the replay starts now, and with ``--speed max`` at 2026-01-01T00:00:00Z.
+    the replay starts now, and with ``--speed max`` at 2026-01-01T00:00:00Z. With ``skip_past`` what was due before
+    the replay began is not sent, as a sensor's past is not.
     """
 
     path: str
     run: str | None = None
     soldier: str | None = None
     start_time_s: UtcSeconds | None = None
+    skip_past: bool = False
     loop: bool = False
     exit_when_done: bool = False
 

@@ -1,4 +1,4 @@
-"""`bootprint bus echo` and `bus rates`: look at the bus without knowing its types.
+"""`bootprint bus echo`, `bus rates` and `bus metrics`: look at the bus without knowing its types.
 
 Messages are read with plain MessagePack, so that unknown versions and broken messages show as well.
 """
@@ -16,11 +16,11 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from bootprint.commands.options import DEFAULT_ROUTER, Duration, Json, Router, write_json
+from bootprint.commands.metrics import metrics
+from bootprint.commands.options import BusWay, Config, Duration, Json, Router, bus_way, write_json
 from bootprint.commands.rates import KeyRate, RateMeter
 from bootprint.stopping import Stop
 from bootprint.topics import VERSION
-from bootprint.zenoh_bus import open_bus
 
 _POLL_S = 0.1
 _REFRESH_S = 0.5
@@ -37,12 +37,14 @@ def register(app: typer.Typer) -> None:
     bus = typer.Typer(no_args_is_help=True, help="Look at the bus: messages and rates.")
     bus.command()(echo)
     bus.command()(rates)
+    bus.command()(metrics)
     app.add_typer(bus, name="bus")
 
 
 def echo(
     selector: Selector = _EVERYTHING,
-    router: Router = DEFAULT_ROUTER,
+    config: Config = None,
+    router: Router = None,
     count: Annotated[int | None, typer.Option(help="Stop after this many messages.", min=1)] = None,
     duration: Duration = None,
 ) -> None:
@@ -52,7 +54,7 @@ def echo(
     """
     console = Console(soft_wrap=True, markup=False)
     left = count
-    with Stop(duration) as stop, _listening(router, selector, stop) as received:
+    with Stop(duration) as stop, _listening(bus_way(config, router), selector, stop) as received:
         for key, payload in received():
             console.print(line(key, payload))
             left = None if left is None else left - 1
@@ -61,7 +63,7 @@ def echo(
 
 
 @contextmanager
-def _listening(router: str, selector: str, stop: Stop) -> Iterator[Callable[[], Iterator[tuple[str, bytes]]]]:
+def _listening(way: BusWay, selector: str, stop: Stop) -> Iterator[Callable[[], Iterator[tuple[str, bytes]]]]:
     """A source of (key, payload) that ends with ``stop``."""
     inbox: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
 
@@ -72,7 +74,7 @@ def _listening(router: str, selector: str, stop: Stop) -> Iterator[Callable[[], 
             except queue.Empty:
                 continue
 
-    bus = open_bus(router, should_stop=stop.is_set)
+    bus = way.open(should_stop=stop.is_set)
     try:
         stop.restart()
         bus.subscribe_raw(selector, lambda key, payload: inbox.put((key, payload)))
@@ -126,7 +128,8 @@ def _short(value: Any) -> str:
 
 def rates(
     selector: Selector = _EVERYTHING,
-    router: Router = DEFAULT_ROUTER,
+    config: Config = None,
+    router: Router = None,
     duration: Duration = None,
     json: Json = None,
 ) -> None:
@@ -137,7 +140,7 @@ def rates(
     Example: bootprint bus rates --duration 10 --json -
     """
     meter = RateMeter()
-    with Stop(duration) as stop, _listening(router, selector, stop) as received:
+    with Stop(duration) as stop, _listening(bus_way(config, router), selector, stop) as received:
         if json:
             for key, payload in received():
                 meter.observe(key, payload)

@@ -1,11 +1,14 @@
 """`bootprint doctor`: what is wrong with this computer, and what mends it."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bootprint.commands.options import Json
+
+if TYPE_CHECKING:
+    from bootprint.findings import Finding
 
 _SIGNS = {"ok": "[green]✓[/]", "warning": "[yellow]![/]", "fault": "[red]✗[/]"}
 
@@ -24,6 +27,13 @@ def doctor(
     Every finding that is not well comes with its mend. Exit code 1 if something will not work (✗); what only does
     not run yet, or could be better, is a warning (!).
     """
+    from bootprint.doctor import examine
+
+    tell(list(examine(config)), json)
+
+
+def tell(findings: "list[Finding]", json: str | None) -> None:
+    """Print findings, or write them as JSON; the command then ends, with 1 if one is a fault."""
     from dataclasses import asdict
 
     from rich.console import Console
@@ -31,9 +41,7 @@ def doctor(
     from rich.table import Table
 
     from bootprint.commands.options import write_json
-    from bootprint.doctor import examine
 
-    findings = list(examine(config))
     if json is not None:
         write_json([asdict(finding) for finding in findings], json)
     else:

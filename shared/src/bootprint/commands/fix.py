@@ -6,11 +6,10 @@ from typing import Annotated
 import typer
 
 from bootprint.bus import Envelope
+from bootprint.commands.options import Config, Router
 from bootprint.commands.person import (
     SOURCE,
     At,
-    Config,
-    PersonsRouter,
     RealmId,
     Soldier,
     Unit,
@@ -45,13 +44,13 @@ def fix(
     config: Config = None,
     realm: RealmId = None,
     unit: Unit = None,
-    router: PersonsRouter = None,
+    router: Router = None,
 ) -> None:
     """Tell the services where a soldier is, and perhaps which way they face.
 
     Example: bootprint fix --config computer.toml 47.05012 8.30932 --azimuth 90
     """
-    identity, known_router = whose(config, realm, unit, soldier)
+    identity, way = whose(config, realm, unit, soldier, router)
     if azimuth is not None and not -360.0 <= azimuth <= 360.0:
         raise ConfigError(f"--azimuth {azimuth:g} must be degrees clockwise from true north, 0 to 360")
     message = made(
@@ -66,5 +65,5 @@ def fix(
         ),
         "a place",
     )
-    publish(Envelope(identity.address("fix", SOURCE), message), router or known_router, _LISTENERS)
+    publish(Envelope(identity.address("fix", SOURCE), message), way, _LISTENERS)
     typer.echo(f"{identity.soldier} is at {latitude} {longitude}")

@@ -8,11 +8,11 @@ from typing import Annotated, TypeVar
 import typer
 
 from bootprint.bus import Envelope
-from bootprint.commands.options import DEFAULT_ROUTER
+from bootprint.commands.options import BusWay, bus_way
 from bootprint.config import load_computer
 from bootprint.errors import BusError, ConfigError
 from bootprint.topics import Address, Identity
-from bootprint.zenoh_bus import ZenohBus, open_bus
+from bootprint.zenoh_bus import ZenohBus
 
 T = TypeVar("T")
 SOURCE = "person"
@@ -22,28 +22,21 @@ _SETTLE_S = 0.5
 
 Soldier = Annotated[str | None, typer.Option("--soldier", help="Whose it is; with --config its own.")]
 At = Annotated[float | None, typer.Option("--at", help="When it was so, UTC seconds; now by default.")]
-Config = Annotated[Path | None, typer.Option("--config", help="The computer.toml that knows realm and unit.")]
 RealmId = Annotated[str | None, typer.Option("--realm", help="Realm id, without --config.")]
 Unit = Annotated[str | None, typer.Option("--unit", help="Unit, without --config.")]
-PersonsRouter = Annotated[
-    str | None,
-    typer.Option(
-        "--router", help="Router to connect to; the configuration's by default.", metavar="ENDPOINT"
-    ),
-]
 
 
 def whose(
-    config: Path | None, realm: str | None, unit: str | None, soldier: str | None
-) -> tuple[Identity, str]:
-    """The soldier's identity, and the router if a configuration names it."""
+    config: Path | None, realm: str | None, unit: str | None, soldier: str | None, router: str | None
+) -> tuple[Identity, BusWay]:
+    """The soldier's identity, and the way to their bus."""
     try:
         if config is not None:
             computer = load_computer(config)
             member = computer.realm.member(soldier) if soldier else computer.member
-            return Identity(computer.realm.id, member.unit, member.id), computer.router
+            return Identity(computer.realm.id, member.unit, member.id), bus_way(config, router)
         if realm and unit and soldier:
-            return Identity(realm, unit, soldier), DEFAULT_ROUTER
+            return Identity(realm, unit, soldier), bus_way(None, router)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     raise ConfigError("whose is it? Give --config computer.toml, or --realm, --unit and --soldier")
@@ -62,11 +55,11 @@ def made(build: Callable[[], T], what: str) -> T:
         raise ConfigError(f"not {what}: {error}") from error
 
 
-def publish(envelope: Envelope, router: str, listeners: Sequence[str]) -> None:
+def publish(envelope: Envelope, way: BusWay, listeners: Sequence[str]) -> None:
     """Send one message, if one of these services of the soldier is there to hear it; BusError if none is."""
-    bus = open_bus(router)
+    bus = way.open()
     try:
-        _check_somebody_listens(bus, envelope.address, router, listeners)
+        _check_somebody_listens(bus, envelope.address, way.router, listeners)
         time.sleep(_SETTLE_S)
         bus.publish(envelope)
     finally:

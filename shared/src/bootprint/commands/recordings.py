@@ -10,13 +10,13 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from bootprint.commands.options import DEFAULT_ROUTER, Duration, Json, Router, parse_speed, write_json
+from bootprint.commands.options import Config, Duration, Json, Router, bus_way, parse_speed, write_json
 from bootprint.errors import ConfigError, RecordingError
 from bootprint.recording import Recorder, Recording
 from bootprint.salvage import Salvage
 from bootprint.stopping import Stop
 from bootprint.topics import BY_SUBJECT, TOPICS, VERSION, check_part, parse_key
-from bootprint.zenoh_bus import ZenohBus, open_bus
+from bootprint.zenoh_bus import ZenohBus
 
 _FLUSH_S = 1.0
 _POLL_S = 0.1
@@ -35,7 +35,8 @@ def register(app: typer.Typer) -> None:
 
 def record(
     out: Annotated[Path, typer.Argument(help="The MCAP file to write.", metavar="OUT.mcap")],
-    router: Router = DEFAULT_ROUTER,
+    config: Config = None,
+    router: Router = None,
     realm: Annotated[str, typer.Option(help="Record this realm only.")] = "*",
     selector: Annotated[
         str | None, typer.Option(help="Record the keys that match, e.g. 'bp/@v1/alpha/a3/**'.")
@@ -51,7 +52,7 @@ def record(
     Example: bootprint record walk.mcap --duration 60
     """
     with Stop(duration) as stop:
-        bus = open_bus(router, should_stop=stop.is_set)
+        bus = bus_way(config, router).open(should_stop=stop.is_set)
         try:
             with Recorder(out, overwrite=overwrite) as recorder:
                 stop.restart()
@@ -94,7 +95,8 @@ def _drain(inbox: _Inbox, recorder: Recorder) -> None:
 def replay(
     file: Annotated[Path, typer.Argument(help="The recording to replay.", metavar="FILE.mcap")],
     speed: Annotated[str, typer.Option(help="Times as fast as it was recorded, or 'max'.")] = "1",
-    router: Router = DEFAULT_ROUTER,
+    config: Config = None,
+    router: Router = None,
     subject: Annotated[list[str] | None, typer.Option(help="Only this subject; may be repeated.")] = None,
     sensors: Annotated[bool, typer.Option("--sensors", help="Only what sensors said.")] = False,
     salvage: Annotated[
@@ -112,7 +114,7 @@ def replay(
     subjects = _subjects(subject or [], sensors)
     recording = Recording(file, salvage=salvage)
     with Stop(duration) as stop:
-        bus = open_bus(router, lossless=factor == math.inf, should_stop=stop.is_set)
+        bus = bus_way(config, router).open(lossless=factor == math.inf, should_stop=stop.is_set)
         try:
             stop.restart()
             count = _replay(recording, bus, subjects, factor, stop)

@@ -7,11 +7,10 @@ import msgspec
 import typer
 
 from bootprint.bus import Envelope
+from bootprint.commands.options import BusWay, Config, Router
 from bootprint.commands.person import (
     SOURCE,
     At,
-    Config,
-    PersonsRouter,
     RealmId,
     Soldier,
     Unit,
@@ -42,15 +41,15 @@ def alert(
     config: Config = None,
     realm: RealmId = None,
     unit: Unit = None,
-    router: PersonsRouter = None,
+    router: Router = None,
 ) -> None:
     """Alert the squad; it goes before everything else on the radio.
 
     Example: bootprint alert --config computer.toml contact "two men, north"
     """
-    identity, known_router = whose(config, realm, unit, soldier)
+    identity, way = whose(config, realm, unit, soldier, router)
     fields = {"soldier": identity.soldier, "kind": kind, "text": text}
-    _tell(identity, _message(Alert, fields, at), router or known_router)
+    _tell(identity, _message(Alert, fields, at), way)
 
 
 def status(
@@ -61,15 +60,15 @@ def status(
     config: Config = None,
     realm: RealmId = None,
     unit: Unit = None,
-    router: PersonsRouter = None,
+    router: Router = None,
 ) -> None:
     """Tell the squad how a soldier is.
 
     Example: bootprint status --config computer.toml wounded --battery 40
     """
-    identity, known_router = whose(config, realm, unit, soldier)
+    identity, way = whose(config, realm, unit, soldier, router)
     fields = {"soldier": identity.soldier, "condition": condition, "battery_pct": battery}
-    _tell(identity, _message(Status, fields, at), router or known_router)
+    _tell(identity, _message(Status, fields, at), way)
 
 
 def observation(
@@ -85,13 +84,13 @@ def observation(
     config: Config = None,
     realm: RealmId = None,
     unit: Unit = None,
-    router: PersonsRouter = None,
+    router: Router = None,
 ) -> None:
     """Tell the squad of something seen, and where.
 
     Example: bootprint observation --config computer.toml 47.05012 8.30932 "on the roof" --code sniper
     """
-    identity, known_router = whose(config, realm, unit, soldier)
+    identity, way = whose(config, realm, unit, soldier, router)
     fields = {
         "soldier": identity.soldier,
         "latitude_deg": latitude,
@@ -100,7 +99,7 @@ def observation(
         "text": text,
         "code": code,
     }
-    _tell(identity, _message(Observation, fields, at), router or known_router)
+    _tell(identity, _message(Observation, fields, at), way)
 
 
 def _message(type_: type[Message], fields: Mapping[str, object], at: float | None) -> Message:
@@ -111,7 +110,7 @@ def _message(type_: type[Message], fields: Mapping[str, object], at: float | Non
     )
 
 
-def _tell(identity: Identity, message: Message, router: str) -> None:
+def _tell(identity: Identity, message: Message, way: BusWay) -> None:
     subject = SUBJECT_OF[type(message)]
-    publish(Envelope(identity.address(subject, SOURCE), message), router, _LISTENERS)
+    publish(Envelope(identity.address(subject, SOURCE), message), way, _LISTENERS)
     typer.echo(f"{subject} of {identity.soldier} is with the hub")

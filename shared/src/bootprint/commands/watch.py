@@ -5,7 +5,8 @@ import time
 import typer
 
 from bootprint.bus import Envelope
-from bootprint.commands.person import SOURCE, Config, PersonsRouter, RealmId, Soldier, Unit, whose
+from bootprint.commands.options import Config, Router
+from bootprint.commands.person import SOURCE, RealmId, Soldier, Unit, whose
 
 
 def register(app: typer.Typer) -> None:
@@ -18,7 +19,7 @@ def watch(
     config: Config = None,
     realm: RealmId = None,
     unit: Unit = None,
-    router: PersonsRouter = None,
+    router: Router = None,
 ) -> None:
     """Show where you are, who is near and what must be known; send alert, status, observation and fix.
 
@@ -28,10 +29,9 @@ def watch(
     from bootprint.topics import SUBJECT_OF
     from bootprint.watch.app import Watch
     from bootprint.watch.view import SUBJECTS, WatchView
-    from bootprint.zenoh_bus import open_bus
 
-    identity, known_router = whose(config, realm, unit, soldier)
-    bus = open_bus(router or known_router)
+    identity, way = whose(config, realm, unit, soldier, router)
+    bus = way.open()
     try:
         inlets = [bus.open_inlet(identity.selector(subject)) for subject in SUBJECTS]
 

@@ -31,12 +31,12 @@ class Watch(App[None]):
     #help { height: 1; padding: 0 1; color: $text-muted; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("a", "order('alert ')", "alert"),
-        Binding("s", "order('status ')", "status"),
-        Binding("o", "order('seen ')", "seen"),
-        Binding("x", "order('here ')", "here"),
+        Binding("a", "order('alert ')", "alert", priority=True),
+        Binding("s", "order('status ')", "status", priority=True),
+        Binding("o", "order('seen ')", "seen", priority=True),
+        Binding("x", "order('here ')", "here", priority=True),
         Binding("escape", "leave", "leave", priority=True),
-        Binding("q", "quit", "quit"),
+        Binding("q", "quit", "quit", priority=True),
     ]
     ENABLE_COMMAND_PALETTE = False
 
@@ -54,6 +54,8 @@ class Watch(App[None]):
         self._send = send
         self._now_ns = now_ns
         self._soldier = soldier
+        self._shown: dict[str, str] = {}
+        self._rows: list[list[Text]] = []
 
     def compose(self) -> ComposeResult:
         """From top to bottom."""
@@ -75,28 +77,47 @@ class Watch(App[None]):
         for envelope in self._take():
             self._view.take(envelope)
         now_ns = self._now_ns()
-        self.query_one("#own", Static).update("\n".join(self._view.own_lines(now_ns)))
         alarms = self._view.alarms(now_ns)
-        told = self.query_one("#alarms", Static)
-        told.update("\n".join(alarms))
-        told.set_class(not alarms, "quiet")
+        self._put("own", "\n".join(self._view.own_lines(now_ns)))
+        self._put("alarms", "\n".join(alarms))
+        self.query_one("#alarms", Static).set_class(not alarms, "quiet")
+        self._list(self._view.friends(now_ns)[:_MOST_FRIENDS])
+
+    def _put(self, name: str, text: str) -> None:
+        """Write what has changed: to lay the screen out anew four times a second would hold up the keys."""
+        if self._shown.get(name) != text:
+            self._shown[name] = text
+            self.query_one(f"#{name}", Static).update(text)
+
+    def _list(self, friends: list[Friend]) -> None:
+        rows = [_row(friend) for friend in friends]
+        if rows == self._rows:
+            return
+        self._rows = rows
         table = self.query_one("#friends", DataTable)
         table.clear()
-        for friend in self._view.friends(now_ns)[:_MOST_FRIENDS]:
-            table.add_row(*_row(friend))
+        for row in rows:
+            table.add_row(*row)
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """While somebody types an order, letters are letters."""
+        is_letter = action in ("order", "quit")
+        return not (is_letter and isinstance(self.focused, Input)) and super().check_action(
+            action, parameters
+        )
 
     def action_order(self, beginning: str) -> None:
         """Begin to type an order."""
         order = self.query_one("#order", Input)
         order.value = beginning
-        order.focus()
+        self.screen.set_focus(order)  # at once: what is typed next belongs there
         order.cursor_position = len(beginning)
         self._say(USAGE[beginning.strip()])
 
     def action_leave(self) -> None:
         """Type nothing."""
         self.query_one("#order", Input).value = ""
-        self.query_one("#friends", DataTable).focus()
+        self.screen.set_focus(self.query_one("#friends", DataTable))
         self._say(_HELP)
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
@@ -111,7 +132,7 @@ class Watch(App[None]):
         self._say(f"sent: {event.value}")
 
     def _say(self, text: str) -> None:
-        self.query_one("#help", Static).update(text)
+        self._put("help", text)
 
 
 def _row(friend: Friend) -> list[Text]:

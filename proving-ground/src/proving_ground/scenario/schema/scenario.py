@@ -6,10 +6,11 @@ from typing import Annotated
 from msgspec import Meta
 
 from bootprint.config import Config, Origin
+from proving_ground.scenario.schema.faults import Fault
 from proving_ground.scenario.schema.people import Kit, Post, Team, Unit
 from proving_ground.scenario.schema.site import SiteTable
 from proving_ground.scenario.schema.units import Length, Name, Seconds
-from proving_ground.scenario.schema.world import Fault, Magnetic, Net, Weather, Zone
+from proving_ground.scenario.schema.world import Magnetic, Net, Weather, Zone
 
 
 class ScenarioFile(Config, kw_only=True, frozen=True):

@@ -1,4 +1,4 @@
-"""What surrounds the soldiers: zones for GPS, magnetism and light, weather, radio nets, faults to inject."""
+"""What surrounds the soldiers: zones for GPS, magnetism and light, weather, radio nets."""
 
 from typing import Annotated, Literal
 
@@ -173,79 +173,3 @@ class Net(Config, kw_only=True, frozen=True):
                 named(self.profile)
             except ConfigError as error:
                 raise ValueError(str(error)) from error
-
-
-class FaultTable(Config, kw_only=True, frozen=True, tag_field="kind"):
-    """Something that breaks."""
-
-    at_s: Seconds
-    target: Annotated[str, Meta(description="soldier, post or, for radio_gone, net")]
-
-
-class SensorFault(FaultTable, kw_only=True, frozen=True):
-    """A sensor of a soldier."""
-
-    sensor: Annotated[
-        Literal["left_foot", "right_foot", "body", "gnss", "pressure", "camera", "range"],
-        Meta(description="which"),
-    ]
-    for_s: Annotated[Length | None, Meta(description="how long (default: to the end)")] = None
-
-
-class Unplugged(SensorFault, kw_only=True, frozen=True, tag="sensor_unplugged"):
-    """It sends nothing."""
-
-
-class Frozen(SensorFault, kw_only=True, frozen=True, tag="sensor_frozen"):
-    """It repeats its last value."""
-
-
-class Saturated(SensorFault, kw_only=True, frozen=True, tag="sensor_saturated"):
-    """It sticks at the end of its range."""
-
-
-class NotANumber(SensorFault, kw_only=True, frozen=True, tag="sensor_nan"):
-    """It sends NaN."""
-
-
-class ProcessKilled(FaultTable, kw_only=True, frozen=True, tag="process_killed"):
-    """A service is killed without warning."""
-
-    process: Literal["sensor-gateway", "pdr-engine", "fusion", "sa-hub"]
-
-
-class RouterKilled(FaultTable, kw_only=True, frozen=True, tag="router_killed"):
-    """The computer's router dies and is started again."""
-
-    for_s: Length = 2.0
-
-
-class RadioGone(FaultTable, kw_only=True, frozen=True, tag="radio_gone"):
-    """A computer's radio, or a whole net, is silent."""
-
-    for_s: Length
-
-
-class ClockJump(FaultTable, kw_only=True, frozen=True, tag="clock_jump"):
-    """The computer's clock jumps."""
-
-    jump_s: Annotated[float, Meta(ge=-1e9, le=1e9)]
-
-
-class DiskFull(FaultTable, kw_only=True, frozen=True, tag="disk_full"):
-    """No file of the computer's services can grow; played by processes."""
-
-    for_s: Length
-
-
-Fault = (
-    Unplugged
-    | Frozen
-    | Saturated
-    | NotANumber
-    | ProcessKilled
-    | RouterKilled
-    | RadioGone
-    | ClockJump
-    | DiskFull
-)

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from bootprint.geodesy import wrap_angle
-from bootprint.messages import FootStep, Vector3, symmetric
+from bootprint.messages import Vector3, symmetric
 from fusion.config import FeetConfig
 from fusion.state import Array
 
@@ -60,12 +60,6 @@ def step_covariance(triangle: tuple[float, ...]) -> Array | None:
     if scale < 0.0 or np.linalg.eigvalsh(covariance)[0] < -1e-9 * max(scale, 1e-12):
         return None
     return covariance
-
-
-def hurried(step: FootStep, boots: FeetConfig) -> Array:
-    """Variances (4, 4) that a run adds: gyros that are carried beyond their range lose some of the turn."""
-    turn = boots.running_turn_sigma_rad**2 if step.motion == "running" else 0.0
-    return np.diag([0.0, 0.0, 0.0, turn])
 
 
 def unmodelled(displacement_m: Vector3, duration_s: float, boots: FeetConfig) -> Array:

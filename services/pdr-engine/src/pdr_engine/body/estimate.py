@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from bootprint.messages import Direction, MotionClass
 from pdr_engine.body.altitude.heights import Height
+from pdr_engine.body.movement.feet import Settled
 from pdr_engine.body.pieces import Stride
 from pdr_engine.body.steps.gait import Gait
 from pdr_engine.body.track.reliability import Reliability
@@ -22,7 +23,7 @@ class BodyStepEstimate:
     ``own_turn_sigma_rad`` from the trunk's, and the azimuth walks by ``azimuth_walk_rad`` from step to step.
 
     Where steps before turned out to have gone elsewhere, or the way back is laid on the way out, length and azimuth
-    hold the correction: steps added up lead where the person is.
+    hold the correction: steps added up lead where the person is. ``settled``: how one of them went, as seen now.
     """
 
     start_ns: int
@@ -34,6 +35,7 @@ class BodyStepEstimate:
     motion: MotionClass
     direction: Direction
     class_probability: float
+    settled: Settled | None
     compass_azimuth_rad: float | None
     gyro_azimuth_rad: float
     satellite_azimuth_rad: float | None

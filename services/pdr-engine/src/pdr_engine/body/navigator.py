@@ -29,6 +29,7 @@ from pdr_engine.body.steps.grid import CELL_S, Cell, Grid
 from pdr_engine.body.steps.intake import Intake, Sample, Vector
 from pdr_engine.body.steps.strides import WIDTH, Cut, Strides
 from pdr_engine.body.track.cross_check import CrossCheck
+from pdr_engine.body.track.honesty import Honesty
 from pdr_engine.body.track.reliability import Reliance
 from pdr_engine.body.track.retrace import Retrace
 
@@ -51,8 +52,8 @@ class BodyNavigator:
         self._attitude = Attitude(self.settings.attitude)
         self._ahead = Ahead(self.settings.forward, self.settings.misalignment_rad)
         self._grid = Grid(WIDTH)
-        self._footfalls = Footfalls(self.settings.steps)
         self._strides = Strides(self.settings.heading.denoising)
+        self._footfalls = Footfalls(self.settings.steps, self._strides)
         self._bearings = Bearings(self.settings)
         self._heights = Heights(self.settings.altitude)
         self._posture, self._feet = Posture(), Feet()
@@ -61,6 +62,7 @@ class BodyNavigator:
             length.scale, length.common_sigma_share, self._lengths.refined(length.refinement)
         )
         self._misalignment = Misalignment()
+        self._honesty = Honesty()
         self._retrace = Retrace() if self.settings.retrace else None
         self._reliance = Reliance(calibrated=length.common_sigma_share < PRIOR_SIGMA)
         self._cross_check = CrossCheck()
@@ -101,6 +103,7 @@ class BodyNavigator:
     def hear_fix(self, time_ns: int, east_m: float, north_m: float, accuracy_m: float) -> None:
         """A satellite fix in a local frame of magnetic north: good ones tell step length and misalignment."""
         stretches = self._personal.stretches
+        accuracy_m = self._honesty.accuracy(time_ns, east_m, north_m, accuracy_m)
         self._personal.fix(time_ns, east_m, north_m, accuracy_m)
         self._misalignment.fix(time_ns, east_m, north_m, accuracy_m)
         self._reliance.fix(time_ns, accuracy_m)
@@ -186,7 +189,8 @@ class BodyNavigator:
         stride = cut.stride(self._ahead.angle_rad, self._gravity_m_s2, self._pressure_pa)
         height = self._heights.step(end_ns)
         movement = self._judge(cut, stride, height)
-        bearing = self._bearings.step(cut, self._attitude.rest_turn_rad_s)
+        rows = self._attitude.rows
+        bearing = self._bearings.step(cut, self._attitude.rest_turn_rad_s, rows, self._ahead.reference(rows))
         if movement.name == "standing":
             self._still_steps += 1
             return []
@@ -231,6 +235,7 @@ class BodyNavigator:
             motion=movement.motion,
             direction=movement.direction,
             class_probability=movement.probability[movement.name],
+            settled=self._feet.settled(self._heights.climb_at),
             compass_azimuth_rad=None if reading is None else (reading.azimuth_rad - ahead_rad) % math.tau,
             gyro_azimuth_rad=(bearing.gyro.azimuth_rad - ahead_rad) % math.tau,
             satellite_azimuth_rad=satellites,
@@ -280,6 +285,7 @@ class BodyNavigator:
         self._steps += 1
         self._personal.walk(length, azimuth)
         self._misalignment.walk(length, azimuth)
+        self._honesty.walk(length, azimuth)
         azimuth += self._misalignment.angle_rad
         if self._retrace is not None:
             learned = self._personal.factor * self._lengths.learned

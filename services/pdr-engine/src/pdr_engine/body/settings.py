@@ -105,6 +105,10 @@ class HeadingSettings(Config, frozen=True):
     # A field that is off by a part of its strength errs by about that angle; indoors alike over some metres.
     disturbance_floor: Positive = 0.14
     correlation_steps: Positive = 240.0
+    # What iron makes a compass err by in malls is alike over this many steps in a row (sum of its autocorrelation,
+    # which is 0.9, 0.6, 0.4 and 0.1 after 1, 3, 5 and 10). A track that is turned while it is walked loses its
+    # shape, so the default goes by the larger figure above; a bridge, whose task the azimuth is, by this one.
+    alike_steps: Positive = 12.0
     sway_steps: Positive = 10.0  # for which tilt errors and sway are alike
     first_sigma_rad: Positive = 0.7  # of a bridge's first azimuth: nobody knows yet what the field is like
     gyro_noise_rad_sqrt_s: NonNegative = 0.005
@@ -145,6 +149,7 @@ class BodySettings(Config, frozen=True):
     heading: HeadingSettings = HeadingSettings()
     altitude: AltitudeSettings = AltitudeSettings()
     calibration: CompassCalibration = CompassCalibration()
+    online_calibration: bool = True  # A5: iron that is worn is learned from turns and taken off
     # B5: compass deviations by place are taken off where earlier walks saw them, and learned for the next.
     deviation_map: bool = False
     deviations: tuple[Deviation, ...] = ()  # in metres east, north of the realm's origin, magnetic north

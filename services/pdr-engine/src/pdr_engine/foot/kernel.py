@@ -87,7 +87,9 @@ def propagate(s: Record, p: Record, at: int, dt: float, gap: bool) -> None:
         P[LEVER + axis, LEVER + axis] += p.lever_walk**2 * dt
         if s.clipped[at & MASK, axis]:
             rebuilt = REBUILT * s.rebuilt[at & MASK, axis]
-            _doubt_axis(s, ATTITUDE, axis, (p.clip_noise**2 + rebuilt**2 * PEAK_S) * dt)
+            variance = (p.clip_noise**2 + rebuilt**2 * PEAK_S) * dt
+            _doubt_axis(s, ATTITUDE, axis, variance)
+            s.cut_angle += variance
         if s.cut_force[at & MASK, axis]:
             _doubt_axis(s, VELOCITY, axis, (p.cut_force * dt) ** 2)
 

@@ -116,6 +116,15 @@ class FootNavigator:
         rows = np.concatenate([piece.rows for piece in pieces])
         return FootEstimates(rows, [step for piece in pieces for step in piece.steps])
 
+    @property
+    def state(self) -> npt.NDArray[Any]:
+        """The record that the navigator is (`memory.STATE`), shape (1,): a view."""
+        return self._state
+
+    def go_on(self, state: npt.NDArray[Any]) -> None:
+        """Become the navigator whose record this is, shape (1,)."""
+        self._state[:] = state
+
     def know_earth_field(self, field: EarthField) -> None:
         """What the field should be here: from now on steps tell their magnetic azimuth where it is like that."""
         self._parameters["earth_horizontal"] = field.horizontal_ut

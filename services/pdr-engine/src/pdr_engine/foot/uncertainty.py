@@ -7,9 +7,9 @@ differ: factors by class, such that of ten-second displacements 95 % lie inside 
 (`proving_ground.evaluation.honesty`).
 
 Steps also err alike: the sole rolls in every stance, so all are short or long together and rise or fall together,
-and the gyro's bias turns all the same way. No covariance of single steps can tell that from noise. The 4x4
-covariance holds both, as it must for one step; the `COMMON` figures say which part is common: who sums steps adds
-that part by its size, not by its square.
+the gyro's bias turns all the same way, and a gyro that saturates cuts the same peak off every stride. No covariance
+of single steps can tell that from noise. The 4x4 covariance holds both, as it must for one step; the `COMMON` and
+`CUT` figures say which part is common: who sums steps adds that part by its size, not by its square.
 """
 
 import math
@@ -28,6 +28,10 @@ COMMON_SLOPE = np.array(
     [0.0075, 0.0075, 0.0075, 0.0075, 0.015, 0.015]
 )  # 1 σ, of a step's length on the ground
 COMMON_TURN_RAD_S = 6.5e-4  # 1 σ: 2.2 °/min
+CUT_ALIKE = (
+    0.12  # of the angle that cut peaks may take along, as a turn: every stride of a gait cuts the same peak
+)
+CUT_SHRINKS = 50.0  # of that angle's fourth power, as a scale error: nothing for runs, a quarter for sprints
 TAIL = 1.0  # ν
 MEASURED = 3.0  # components of the velocity
 LARGEST_NIS = 100.0
@@ -69,13 +73,16 @@ def widen(row: Record) -> None:
     for i in range(4):
         for j in range(4):
             row.covariance[i, j] *= (up if i == 2 else plane) * (up if j == 2 else plane)
+    cut = plane * row.cut_rad
+    scale = math.hypot(COMMON_SCALE[row.motion], CUT_SHRINKS * cut**4)
     for i in range(3):
         for j in range(3):
-            alike = row.displacement_m[i] * row.displacement_m[j]
-            row.covariance[i, j] += COMMON_SCALE[row.motion] ** 2 * alike
+            row.covariance[i, j] += scale**2 * row.displacement_m[i] * row.displacement_m[j]
     across = math.hypot(row.displacement_m[0], row.displacement_m[1])
     row.covariance[2, 2] += (COMMON_SLOPE[row.motion] * across) ** 2
-    row.covariance[3, 3] += (COMMON_TURN_RAD_S * (row.time_ns - row.start_time_ns) * NS) ** 2
-    row.common_scale, row.common_slope = COMMON_SCALE[row.motion], COMMON_SLOPE[row.motion]
-    row.common_turn_rad_s = COMMON_TURN_RAD_S
+    duration_s = max(1, row.time_ns - row.start_time_ns) * NS
+    turn = math.hypot(COMMON_TURN_RAD_S * duration_s, CUT_ALIKE * cut)
+    row.covariance[3, 3] += turn**2
+    row.common_scale, row.common_slope = scale, COMMON_SLOPE[row.motion]
+    row.common_turn_rad_s = turn / duration_s
     row.quality_pct = 100.0 * (1.0 - min(1.0, row.doubt)) / max(1.0, landing)

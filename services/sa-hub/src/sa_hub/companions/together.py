@@ -82,7 +82,17 @@ def companions_of(context: Context, settings: HubSettings, announce: Announce, p
     workers: list[Companion] = [Worker(sink) for sink in _sinks(context, settings, announce)]
     if settings.page is not None and settings.page.enabled:
         workers.append(_page(context, settings, settings.page, place))
+    workers += _rooms(context, settings, announce)
     return Companions(workers)
+
+
+def _rooms(context: Context, settings: HubSettings, announce: Announce) -> list[Companion]:
+    if all(link.kind != "zenoh" for link in settings.links):
+        return []
+    from sa_hub.rooms.companion import room_links
+
+    shared = room_links(context, settings.links, settings.group_key, announce)
+    return [] if shared is None else [shared]
 
 
 def _page(context: Context, settings: HubSettings, page: PageSettings, place: Place) -> Companion:

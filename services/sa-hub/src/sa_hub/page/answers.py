@@ -5,13 +5,14 @@ from typing import Any, cast
 
 import msgspec
 
-from bootprint.bus import Envelope
-from bootprint.messages import Track
+from bootprint.messages import Message, Track
 from sa_hub.page import geojson
 from sa_hub.page.asking import Ask, Refused
+from sa_hub.page.basemap import BasemapKind, kind_of
 from sa_hub.page.desk import Desk
 from sa_hub.page.geojson import FeatureCollection
 from sa_hub.page.operations import ALERT_KINDS, CODES
+from sa_hub.page.rooms import rooms_layer
 from sa_hub.page.settings import Role
 from sa_hub.page.views import (
     AlertView,
@@ -19,6 +20,7 @@ from sa_hub.page.views import (
     HealthView,
     LinkView,
     ObservationView,
+    RoomsView,
     SoldierView,
     StatusView,
     TrackView,
@@ -42,7 +44,7 @@ class PostView(msgspec.Struct, kw_only=True, frozen=True):
     stale_s: float
     lost_s: float
     has_plan: bool
-    has_basemap: bool
+    basemap: BasemapKind | None
     has_history: bool
     alert_kinds: tuple[str, ...]
     codes: tuple[str, ...]
@@ -63,6 +65,7 @@ class PictureView(msgspec.Struct, kw_only=True, frozen=True):
     links: dict[str, LinkView] = {}
     health: dict[str, HealthView] = {}
     warnings: dict[str, WarningView] = {}
+    rooms: dict[str, RoomsView] = {}
 
 
 class Fixed(msgspec.Struct, kw_only=True, frozen=True):
@@ -105,7 +108,7 @@ def post(desk: Desk, ask: Ask) -> PostView:
         stale_s=seconds(desk.post.ages.stale_ns),
         lost_s=seconds(desk.post.ages.lost_ns),
         has_plan=desk.plan is not None,
-        has_basemap=desk.basemap is not None,
+        basemap=None if desk.basemap is None else kind_of(desk.basemap),
         has_history=desk.archive is not None,
         alert_kinds=ALERT_KINDS,
         codes=CODES,
@@ -142,6 +145,11 @@ def observations(desk: Desk, _ask: Ask) -> FeatureCollection:
     )
 
 
+def rooms(desk: Desk, _ask: Ask) -> FeatureCollection:
+    """Everybody's maps."""
+    return rooms_layer(desk.rooms.values(), desk.post.realm.origin)
+
+
 def plan(desk: Desk, _ask: Ask) -> Any:
     """The file as it stands."""
     if desk.plan is None:
@@ -157,7 +165,7 @@ def plan(desk: Desk, _ask: Ask) -> Any:
 
 def alert(desk: Desk, ask: Ask) -> View:
     """Alert everybody."""
-    return _published(desk.post.own(desk.post.alert(ask.body)))
+    return _kept(desk, desk.post.alert(ask.body))
 
 
 def acknowledge(desk: Desk, ask: Ask) -> Acknowledged:
@@ -171,18 +179,18 @@ def acknowledge(desk: Desk, ask: Ask) -> Acknowledged:
 def observe(desk: Desk, ask: Ask) -> View:
     """A thing seen."""
     _must_say_something(ask)
-    return _published(desk.post.own(desk.post.observe(ask.body)))
+    return _kept(desk, desk.post.observe(ask.body))
 
 
 def sight(desk: Desk, ask: Ask) -> View:
     """A thing seen from a soldier."""
     _must_say_something(ask)
-    return _published(desk.post.own(desk.post.sight(ask.body, _track(desk, ask.body.soldier))))
+    return _kept(desk, desk.post.sight(ask.body, _track(desk, ask.body.soldier)))
 
 
 def status(desk: Desk, ask: Ask) -> View:
     """How the command post is."""
-    return _published(desk.post.own(desk.post.tell_status(ask.body)))
+    return _kept(desk, desk.post.tell_status(ask.body))
 
 
 def fix(desk: Desk, ask: Ask) -> Fixed:
@@ -210,7 +218,10 @@ def _track(desk: Desk, soldier: str) -> Track:
     return track
 
 
-def _published(envelope: Envelope) -> View:
+def _kept(desk: Desk, message: Message) -> View:
+    """What was published, as a view: it is on the disk before anybody is told that it was done."""
+    envelope = desk.post.own(message)
+    desk.keep(envelope)
     found = view_of(envelope)
     assert found is not None, "every message that the page publishes has a view"
     return found[2]

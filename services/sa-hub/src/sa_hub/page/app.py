@@ -23,6 +23,7 @@ from starlette.websockets import WebSocket
 from bootprint.errors import BootprintError
 from sa_hub.page.access import COOKIE, SESSION_S, Access, Principal, Rates
 from sa_hub.page.asking import Ask, Fault, Refused, body_of, query_of
+from sa_hub.page.basemap_routes import basemap_routes
 from sa_hub.page.desk import Desk
 from sa_hub.page.endpoints import ENDPOINTS, ROOT, Endpoint
 from sa_hub.page.live import LIVE_PATH, Browsers
@@ -77,6 +78,12 @@ class Door:
         if not self.access.origin_is_ours(origin, host):
             raise Refused(403, f"requests from {origin} are not taken")
 
+    def check_guest(self, connection: HTTPConnection) -> None:
+        """Refused for another site, or without a token where one is wanted."""
+        self.check_site(connection)
+        if self.principal(connection) is None:
+            raise Refused(401, "want a token: Authorization: Bearer …")
+
     def check_role(self, connection: HTTPConnection, endpoint: Endpoint) -> Principal:
         """Who asks; Refused if they may not, or too often."""
         self.check_site(connection)
@@ -108,7 +115,7 @@ def build_app(desk: Desk, settings: PageSettings, static: Path = STATIC) -> ASGI
         *(Route(ROOT + each.path, _route(each, desk, door), methods=[each.method]) for each in ENDPOINTS),
         *_sessions(desk, door),
         Route(f"{ROOT}/openapi.json", _openapi),
-        Route("/basemap", _basemap(desk, door)),
+        *basemap_routes(desk.basemap, door.check_guest),
         WebSocketRoute(LIVE_PATH, live),
         _page(static),
     ]
@@ -252,20 +259,6 @@ async def _live(socket: WebSocket, door: Door, browsers: Browsers) -> None:
 
 async def _openapi(_request: Request) -> Response:
     return _json(openapi())
-
-
-def _basemap(desk: Desk, door: Door) -> Callable[[Request], Awaitable[Response]]:
-    """The PMTiles file, by ranges of bytes, for whoever may look on at all."""
-
-    async def basemap(request: Request) -> Response:
-        door.check_site(request)
-        if door.principal(request) is None:
-            raise Refused(401, "want a token: Authorization: Bearer …")
-        if desk.basemap is None:
-            raise Refused(404, "no basemap: want [hub.page] basemap in computer.toml")
-        return FileResponse(desk.basemap, media_type="application/octet-stream")
-
-    return basemap
 
 
 def _page(static: Path) -> BaseRoute:

@@ -7,11 +7,14 @@ dropped and counted.
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from bootprint.bus import Envelope
+from bootprint.errors import RecordingError
 from bootprint.messages import Track
+from bootprint.rooms import RoomMap
 from sa_hub.page.audit import Audit
 from sa_hub.page.operations import Post
 from sa_hub.page.picture import Picture
@@ -30,6 +33,7 @@ SHOWN: Final = (
     "link",
     "health",
     "friendly_warning",
+    "rooms",
 )
 """Subjects that the page shows."""
 
@@ -54,6 +58,7 @@ class Desk:
         self.archive = archive
         self.picture = Picture()
         self.tracks: dict[str, Track] = {}
+        self.rooms: dict[str, RoomMap] = {}
         self.dropped = 0
         self.refused = 0
         self.clients = 0
@@ -69,6 +74,16 @@ class Desk:
             self._waiting.extend(shown[:room])
             self.dropped += max(0, len(shown) - room)
 
+    def keep(self, envelope: Envelope) -> None:
+        """Put what somebody has ordered here onto the archive's disk, if there is one; waits for it.
+
+        The archive's companion will hear it, too, and pass over what is there. It also tries again where the disk
+        fails, and tells of it: an alert does not wait for a disk to be mended.
+        """
+        if self.archive is not None:
+            with suppress(RecordingError):
+                self.archive.store([envelope])
+
     def catch_up(self) -> bool:
         """Take what waits into the picture; whether anything is new."""
         with self._lock:
@@ -77,6 +92,8 @@ class Desk:
         for envelope in envelopes:
             if isinstance(envelope.message, Track):
                 self.tracks[envelope.message.soldier] = envelope.message
+            elif isinstance(envelope.message, RoomMap):
+                self.rooms[envelope.message.soldier] = envelope.message
         return self.picture.advance(envelopes)
 
     def figures(self) -> tuple[dict[str, int], dict[str, float]]:

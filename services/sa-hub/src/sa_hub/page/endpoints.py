@@ -25,7 +25,7 @@ Handler = Callable[[Desk, Ask], Any]
 
 @dataclass(frozen=True)
 class Endpoint:
-    """One line of the interface. ``slow``: reads the archive, so not in the server's own thread."""
+    """One line of the interface. ``slow``: waits for the archive, so not in the server's own thread."""
 
     method: Literal["GET", "POST"]
     path: str
@@ -57,6 +57,7 @@ ENDPOINTS: Final = (
         "GET", "/observations.geojson", "view", "What has been seen", answers.observations, FeatureCollection
     ),
     Endpoint("GET", "/plan.geojson", "view", "The buildings", answers.plan, FeatureCollection),
+    Endpoint("GET", "/rooms.geojson", "view", "Rooms walked and seen", answers.rooms, FeatureCollection),
     Endpoint("GET", "/history", "view", "What the archive spans", past.history, History, slow=True),
     Endpoint(
         "GET",
@@ -99,7 +100,9 @@ ENDPOINTS: Final = (
         slow=True,
         media="application/octet-stream",
     ),
-    Endpoint("POST", "/alerts", "operate", "Alert everybody", answers.alert, AlertView, body=NewAlert),
+    Endpoint(
+        "POST", "/alerts", "operate", "Alert everybody", answers.alert, AlertView, body=NewAlert, slow=True
+    ),
     Endpoint(
         "POST",
         "/alerts/{id}/acknowledgement",
@@ -116,6 +119,7 @@ ENDPOINTS: Final = (
         answers.observe,
         ObservationView,
         body=NewObservation,
+        slow=True,
     ),
     Endpoint(
         "POST",
@@ -125,9 +129,17 @@ ENDPOINTS: Final = (
         answers.sight,
         ObservationView,
         body=NewSighting,
+        slow=True,
     ),
     Endpoint(
-        "POST", "/status", "operate", "How the command post is", answers.status, StatusView, body=NewStatus
+        "POST",
+        "/status",
+        "operate",
+        "How the command post is",
+        answers.status,
+        StatusView,
+        body=NewStatus,
+        slow=True,
     ),
     Endpoint("POST", "/fixes", "operate", "Where a soldier is", answers.fix, Fixed, body=NewFix),
     Endpoint("GET", "/audit", "admin", "The newest changes", answers.audit, list[AuditRow]),

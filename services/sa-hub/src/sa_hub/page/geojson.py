@@ -75,6 +75,9 @@ def _soldier(track: Track, now_ns: int, ages: Ages) -> Feature:
             "course_deg": round(math.degrees(azimuth_of(east_m_s, north_m_s)), 1)
             if speed_m_s > _STILL_M_S
             else None,
+            "facing_deg": None
+            if track.facing_rad is None
+            else round(math.degrees(track.facing_rad) % 360.0, 1),
             "floor": track.floor,
             "mode": track.mode,
             "height_m": track.height_m,

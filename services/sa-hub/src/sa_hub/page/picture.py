@@ -13,7 +13,17 @@ from msgspec.structs import replace
 from bootprint.bus import Envelope
 from sa_hub.page.views import AlertView, View, view_of
 
-KINDS: Final = ("tracks", "foreign", "statuses", "alerts", "observations", "links", "health", "warnings")
+KINDS: Final = (
+    "tracks",
+    "foreign",
+    "statuses",
+    "alerts",
+    "observations",
+    "links",
+    "health",
+    "warnings",
+    "rooms",
+)
 _MOST: Final = {"foreign": 500, "alerts": 200, "observations": 500}
 Changes = dict[str, dict[str, View]]
 

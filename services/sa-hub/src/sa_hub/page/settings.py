@@ -6,7 +6,7 @@
     host = "127.0.0.1"              # any other address needs TLS and tokens
     port = 8080
     plan = "plan.geojson"           # buildings: properties.kind and .floor, as exercises have them
-    basemap = "area.pmtiles"
+    basemap = "area.pmtiles"        # or an MBTiles file; raster or vector tiles
 
     [[hub.page.tokens]]             # made by `bootprint page token`
     name = "watch officer"
@@ -22,6 +22,7 @@ import msgspec
 
 from bootprint.config import Config
 from bootprint.errors import ConfigError
+from sa_hub.page.basemap import kind_of
 
 Role = Literal["view", "operate", "admin"]
 ROLES: Final[tuple[Role, ...]] = ("view", "operate", "admin")
@@ -81,3 +82,5 @@ def check_page(settings: PageSettings, folder: Path, where: str) -> None:
         name: str | None = getattr(settings, key)
         if name is not None and not (folder / name).is_file():
             raise ConfigError(f"{where}.{key}: {folder / name}: no such file")
+    if settings.basemap is not None:
+        kind_of(folder / settings.basemap)

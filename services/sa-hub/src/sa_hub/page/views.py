@@ -13,6 +13,7 @@ from bootprint.clock import NS_PER_S
 from bootprint.config import Member
 from bootprint.foreign import ForeignTrack
 from bootprint.messages import Alert, Health, LinkReport, Message, Observation, Status, Track
+from bootprint.rooms import RoomMap
 
 UtcSeconds = Annotated[float, msgspec.Meta(description="UTC seconds since 1970, of event time")]
 
@@ -51,6 +52,7 @@ class TrackView(View, frozen=True):
     received_s: float | None
     held_m: float | None
     held_s: float | None
+    facing_rad: float | None
 
 
 class ForeignView(View, frozen=True):
@@ -135,6 +137,13 @@ class WarningView(View, frozen=True):
     probability_pct: float
 
 
+class RoomsView(View, frozen=True):
+    """That a soldier's map of rooms is there, or has grown; what is in it: ``rooms.geojson``."""
+
+    soldier: str
+    floors: tuple[int, ...]
+
+
 def seconds(time_ns: int) -> float:
     """Nanoseconds as seconds; at today's UTC good to a quarter of a microsecond."""
     return time_ns / NS_PER_S
@@ -187,6 +196,9 @@ def view_of(envelope: Envelope) -> tuple[str, str, View] | None:
             return "links", message.link, LinkView(**_alike(message, LinkView))
         case FriendlyWarning():
             return "warnings", message.friendly, WarningView(**_alike(message, WarningView))
+        case RoomMap():
+            floors = tuple(floor for floor, _ in message.levels)
+            return "rooms", message.soldier, RoomsView(floors=floors, **_alike(message, RoomsView, "floors"))
         case Health():
             soldier = envelope.address.soldier
             health = HealthView(soldier=soldier, **_alike(message, HealthView, "soldier"))

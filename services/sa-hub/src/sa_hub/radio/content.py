@@ -23,7 +23,8 @@ class Report:
     """Where one soldier was at ``time_ns``; velocity is east and north, accuracy one sigma, height ellipsoidal.
 
     ``hops`` counts the relays it passed. ``cell_m`` is the edge of the lattice cell that a frame rounded the
-    position to, 0 for a position that has not travelled.
+    position to, 0 for a position that has not travelled. ``facing_deg``: where the body faces, clockwise from true
+    north; frames tell it of who stands.
     """
 
     number: int
@@ -39,6 +40,7 @@ class Report:
     condition: Condition = "ok"
     hops: int = 0
     cell_m: float = 0.0
+    facing_deg: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +75,13 @@ class Level:
 
 
 @dataclass(frozen=True, slots=True)
+class Facing:
+    """Where the body faces, as a code of the layout; None where that is unknown."""
+
+    direction: int | None
+
+
+@dataclass(frozen=True, slots=True)
 class Entry:
     """One soldier in an update: row and column (told modulo), velocity codes or None, what has changed."""
 
@@ -83,6 +92,7 @@ class Entry:
     age_ticks: int = 0
     quality: Quality | None = None
     level: Level | None = None
+    facing: Facing | None = None
     far: bool = False
     steady: bool = False
 
@@ -155,7 +165,7 @@ class StatusNotice:
 
 
 Notice = AlertNotice | ObservationNotice | StatusNotice
-Content = Reports | Update | Notice | Acknowledgement | Request | Fragment
+Content = Reports | Update | Feedback | Notice | Acknowledgement | Request | Fragment
 Relayable = TypeVar("Relayable", bound=Report | AlertNotice | ObservationNotice | StatusNotice)
 
 

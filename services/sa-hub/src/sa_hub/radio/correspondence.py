@@ -10,7 +10,7 @@ from typing import Final
 
 from bootprint.clock import NS_PER_S
 from sa_hub.radio.answers import Answers
-from sa_hub.radio.content import Notice, ObservationNotice, Reports, Update
+from sa_hub.radio.content import Feedback, Notice, ObservationNotice, Reports, Update
 from sa_hub.radio.control import Acknowledgement, Fragment, Request
 from sa_hub.radio.errors import FrameError
 from sa_hub.radio.fragments import Collector
@@ -73,7 +73,7 @@ class Correspondence:
             case Reports():
                 self._heard_reports(opened.sender, frame.content, now_ns)
                 return frame.content
-            case Update():
+            case Update() | Feedback():
                 return None
             case _:
                 self._owe(opened, frame, key_of(frame.content), now_ns)

@@ -3,10 +3,14 @@
 from typing import Final
 
 from sa_hub.radio import quantise as q
-from sa_hub.radio.content import CONDITIONS, Level, Quality, Report
+from sa_hub.radio.content import CONDITIONS, Facing, Level, Quality, Report
+from sa_hub.radio.ground import turn_deg
 
+DETAILS: Final = 3
+"""Quality, level and facing: what is told only where it has changed."""
 _ACCURACY_STEPS: Final = 2
 _HEIGHT_STEP_M: Final = 3
+_TURN_DEG: Final = 20.0
 
 
 def quality_to_tell(report: Report, told: Report | None) -> Quality:
@@ -28,9 +32,24 @@ def level_to_tell(report: Report, told: Report | None) -> Level:
     return Level(floor, height_m)
 
 
-def details_code(report: Report, told: Report | None) -> tuple[int, int]:
-    """One number each for the quality and the level to tell, equal where these are."""
-    return _quality_code(quality_to_tell(report, told)), _level_code(level_to_tell(report, told))
+def facing_to_tell(report: Report, told: Report | None) -> Facing:
+    """The facing to tell; who has turned by less than 20° is told as before."""
+    if report.facing_deg is None:
+        return Facing(None)
+    before = None if told is None else told.facing_deg
+    if before is not None and abs(turn_deg(report.facing_deg - before)) < _TURN_DEG:
+        return Facing(q.direction_code(before))
+    return Facing(q.direction_code(report.facing_deg))
+
+
+def details_code(report: Report, told: Report | None) -> tuple[int, int, int]:
+    """One number each for the quality, the level and the facing to tell, equal where these are."""
+    direction = facing_to_tell(report, told).direction
+    return (
+        _quality_code(quality_to_tell(report, told)),
+        _level_code(level_to_tell(report, told)),
+        -1 if direction is None else direction,
+    )
 
 
 def _quality_code(quality: Quality) -> int:

@@ -10,14 +10,15 @@ from dataclasses import dataclass, replace
 from bootprint.config import Origin
 from sa_hub.radio import control_codec, notice_codec
 from sa_hub.radio.bits import BitReader, BitWriter
-from sa_hub.radio.content import Content, Reports, Update
+from sa_hub.radio.content import Content, Feedback, Reports, Update
 from sa_hub.radio.control import Asked, Control
 from sa_hub.radio.errors import FrameError
+from sa_hub.radio.feedback_codec import decode_feedback, encode_feedback, read_feedback, write_feedback
 from sa_hub.radio.grid import Grid
 from sa_hub.radio.layout import KIND_BITS, Kind
 from sa_hub.radio.quantise import tick_of
 from sa_hub.radio.report_codec import Decoded, ReportCodec
-from sa_hub.radio.update_codec import read_feedback, read_update, write_feedback, write_update
+from sa_hub.radio.update_codec import read_update, write_update
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +44,7 @@ class Codec:
             Kind.ACKNOWLEDGEMENT: control_codec.decode_acknowledgement,
             Kind.REQUEST: control_codec.decode_request,
             Kind.FRAGMENT: control_codec.decode_fragment,
+            Kind.FEEDBACK: decode_feedback,
         }
         self._squads: dict[int, Callable[[BitReader, int, int], Decoded]] = {
             Kind.SELF: self._reports.decode_self,
@@ -62,6 +64,8 @@ class Codec:
             return self._encode_reports(sender, content, resolution)
         if isinstance(content, Update):
             return self._encode_update(sender, content)
+        if isinstance(content, Feedback):
+            return encode_feedback(content, exercise=self._exercise)
         if isinstance(content, Control):
             return control_codec.encode_control(content, exercise=self._exercise, asked=asked)
         return notice_codec.encode_notice(

@@ -5,7 +5,7 @@ ellipsoid, of the way that a soldier goes between two reports.
 """
 
 import math
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from bootprint.clock import NS_PER_S
 from bootprint.prediction import moved_m
 
 FloatArray = npt.NDArray[np.float64]
+Degrees = TypeVar("Degrees", float, FloatArray)
 METRES_PER_DEG: Final = 40_007_863.0 / 360.0
 _SMALLEST_COSINE: Final = 1e-3
 
@@ -28,9 +29,9 @@ def cosines(latitude_deg: FloatArray) -> FloatArray:
     return np.maximum(np.cos(np.radians(latitude_deg)), _SMALLEST_COSINE)
 
 
-def turn_deg(longitude_deg: FloatArray) -> FloatArray:
-    """A difference of longitudes the short way round: −180° to 180°."""
-    return (longitude_deg + 180.0) % 360.0 - 180.0
+def turn_deg(difference_deg: Degrees) -> Degrees:
+    """A difference of longitudes or azimuths the short way round: −180° to 180°."""
+    return (difference_deg + 180.0) % 360.0 - 180.0
 
 
 def moved_deg(
@@ -40,4 +41,4 @@ def moved_deg(
     east_m, north_m = moved_m(*velocity_m_s, elapsed_ns / NS_PER_S)
     latitude = min(max(latitude_deg + north_m / METRES_PER_DEG, -90.0), 90.0)
     longitude = longitude_deg + east_m / (METRES_PER_DEG * cosine(latitude_deg))
-    return latitude, (longitude + 180.0) % 360.0 - 180.0
+    return latitude, turn_deg(longitude)

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from sa_hub.radio.content import Feedback
+from sa_hub.radio.feedback_codec import LONGEST_SPAN, SPAN_STEP
 from sa_hub.radio.replay import Heard
-from sa_hub.radio.update_codec import LONGEST_SPAN, SPAN_STEP
 
 _ENOUGH: Final = 24
 

@@ -11,7 +11,7 @@ import numpy as np
 from bootprint.prediction import reaches_s
 from sa_hub.radio import quantise as q
 from sa_hub.radio.content import Report
-from sa_hub.radio.details import details_code
+from sa_hub.radio.details import DETAILS, details_code
 from sa_hub.radio.grid import Grid
 from sa_hub.radio.ground import METRES_PER_DEG, FloatArray, cosines, turn_deg
 from sa_hub.radio.picture import BoolArray, IntArray, Spoken, widened
@@ -36,7 +36,7 @@ class History:
         self._longitude = np.empty((0, DEPTH))
         self._east = np.empty((0, DEPTH))
         self._north = np.empty((0, DEPTH))
-        self._details = np.empty((0, DEPTH, 2), dtype=np.int64)
+        self._details = np.empty((0, DEPTH, DETAILS), dtype=np.int64)
         self._whole = False
         self._kept = np.empty(0, dtype=np.int64)
         self._anew = np.empty(0, dtype=np.bool_)
@@ -57,7 +57,7 @@ class History:
             (self._longitude, spoken.longitude),
             (self._east, spoken.east),
             (self._north, spoken.north),
-            (self._details, [details_code(report, None) for report in reports] or np.empty((0, 2))),
+            (self._details, [details_code(report, None) for report in reports] or np.empty((0, DETAILS))),
         ):
             array[slots, 1:] = array[slots, :-1]
             array[slots, 0] = newest
@@ -81,9 +81,9 @@ class History:
         self._whole = True
 
     def details_differ(self, slots: IntArray, details: IntArray) -> BoolArray:
-        """(n, DEPTH, 2) whether quality and level are other than in any of the newest 1, 2, … entries.
+        """(n, DEPTH, DETAILS) whether each detail is other than in any of the newest 1, 2, … entries.
 
-        ``details`` (n, 2) are their `codes` now.
+        ``details`` (n, DETAILS) are their `details_code` now.
         """
         differ = self._details[slots] != details[:, None, :]
         differ &= self._exists(slots)[:, :, None]

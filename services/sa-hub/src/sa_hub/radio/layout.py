@@ -15,7 +15,7 @@ KIND_BITS: Final = 4
 
 
 class Kind(IntEnum):
-    """What a frame's payload is: its first 4 bits. 9 to 15 are free."""
+    """What a frame's payload is: its first 4 bits. 10 to 15 are free."""
 
     SELF = 0
     SQUAD = 1
@@ -26,6 +26,7 @@ class Kind(IntEnum):
     ACKNOWLEDGEMENT = 6
     REQUEST = 7
     FRAGMENT = 8
+    FEEDBACK = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +84,7 @@ PAYLOAD: Final = (
         "kind",
         KIND_BITS,
         "0 own report, 1 squad report, 2 alert, 3 observation, 4 status, 5 squad update, "
-        "6 acknowledgement, 7 request, 8 fragment",
+        "6 acknowledgement, 7 request, 8 fragment, 9 feedback",
     ),
 )
 
@@ -110,11 +111,14 @@ _MOTION: Final = (
     Field("direction", 4, "of motion, 1/16 turn clockwise from true north", (("moving", 1),)),
     Field("speed", 4, "0.3 m/s · 1.28^code", (("moving", 1),)),
 )
+_FACING: Final = "of the body: 1/16 turn clockwise from true north"
 _DETAIL: Final = (
-    Field("detail", 1, "0: condition ok, floor unknown"),
+    Field("detail", 1, "0: condition ok, floor and facing unknown"),
     Field("condition", 2, "0 ok, 1 busy, 2 wounded, 3 out", (("detail", 1),)),
     Field("has_floor", 1, "1: floor is known", (("detail", 1),)),
     Field("floor", 7, "floor, from −32", (("has_floor", 1),)),
+    Field("has_facing", 1, "1: facing is known", (("detail", 1),)),
+    Field("facing", 4, _FACING, (("has_facing", 1),)),
 )
 _ACCURACY: Final = "one sigma, not above 0.5, 1, 2, 4, 8, 16, 50 m; 7: worse or unknown"
 _MODE: Final = "0 unplaced, 1 gnss, 2 boots, 3 body, 4 camera, 5 coasting, 6 lost"
@@ -173,7 +177,7 @@ UPDATE: Final = (
     Field("misses", 3, f"code of {', '.join(map(str, MISSES))}: for who missed no more", _TOLD),
     Field("plain", 1, "1: the next three are 0", _TOLD),
     Field("paced", 1, "0: speeds of people on foot; 1: all speeds", _PLAIN),
-    Field("detailed", 1, "1: some soldier's quality or level has changed", _PLAIN),
+    Field("detailed", 1, "1: some soldier's quality, level or facing has changed", _PLAIN),
     Field("aged", 1, "1: some soldier's report is older than 2 s", _PLAIN),
     Field(
         "varied",
@@ -223,6 +227,9 @@ ENTRY: Final = (
     Field("floor", 7, "floor, from −32", (("has_floor", 1),)),
     Field("has_height", 1, "1: height is known", (_LEVEL,)),
     Field("height", 8, "m above the ellipsoid, low bits, nearest to what was told before", (_HEIGHT,)),
+    Field("turned", 1, "1: facing follows; 0: as told before", (("detailed", 1),)),
+    Field("has_facing", 1, "1: facing is known", (("turned", 1),)),
+    Field("facing", 4, _FACING, (("has_facing", 1),)),
 )
 GAP: Final = Field("gap", "Rice", "from the second on: numbers left out since the previous soldier's")
 FEEDBACK: Final = (
@@ -231,6 +238,7 @@ FEEDBACK: Final = (
     Field("span", 3, "length of what follows, in steps of four"),
     Field("heard", "4 · span + 4", "the counters before the newest, bit 0 the one right before: 1 heard"),
 )
+FEEDBACK_ALONE: Final = (Field("exercise", 1, "1: exercise, not real"),)
 _NOTICE: Final = (
     Field("exercise", 1, "1: exercise, not real"),
     Field("time", 16, "of the event: 0.1 s ticks since 1970, modulo 65,536"),
@@ -295,6 +303,7 @@ SECTIONS: Final[tuple[tuple[str, tuple[Field, ...]], ...]] = (
     ("Squad update (kind 5)", UPDATE),
     ("Squad update, once for each soldier, by number", (GAP, *ENTRY)),
     ("Feedback (after the last field of kinds 0, 1 and 5, if 8 bits or more are left)", FEEDBACK),
+    ("Feedback alone (kind 9), before the same fields", FEEDBACK_ALONE),
     ("Alert (kind 2)", ALERT),
     ("Observation (kind 3)", OBSERVATION),
     ("Status (kind 4)", STATUS),

@@ -14,8 +14,8 @@ import numpy as np
 
 from bootprint.clock import NS_PER_S
 from sa_hub.radio.content import Feedback
+from sa_hub.radio.feedback_codec import COUNTER_MODULUS
 from sa_hub.radio.picture import BoolArray, Pictures, Spoken
-from sa_hub.radio.update_codec import COUNTER_MODULUS
 
 ROWS: Final = 24
 LOSSLESS: Final = 0.005

@@ -15,19 +15,27 @@ from bootprint.clock import NS_PER_S
 from bootprint.errors import BootprintError
 from bootprint.messages import LinkReport
 from sa_hub.radio.budget import TokenBucket
-from sa_hub.radio.content import AlertNotice, Content, Notice, ObservationNotice, Report, Reports, Update
+from sa_hub.radio.content import (
+    AlertNotice,
+    Content,
+    Feedback,
+    Notice,
+    ObservationNotice,
+    Report,
+    Reports,
+    Update,
+)
 from sa_hub.radio.control import MOST_FRAGMENTS, Acknowledgement, Asked, Request
 from sa_hub.radio.correspondence import Correspondence, Station, Told
 from sa_hub.radio.errors import FrameError
 from sa_hub.radio.fragments import HEAD_BYTES, Cutter
 from sa_hub.radio.frame import Codec
 from sa_hub.radio.header import Header, read_header
-from sa_hub.radio.hearing import Hearing
 from sa_hub.radio.layout import FULL_HEADER_BYTES
 from sa_hub.radio.link_profile import SMALLEST_MTU_BYTES, LinkProfile
 from sa_hub.radio.meter import LinkMeter
 from sa_hub.radio.quantise import resolution_for
-from sa_hub.radio.references import References
+from sa_hub.radio.reception import Reception
 from sa_hub.radio.relevance import Relevance
 from sa_hub.radio.room import Room
 from sa_hub.radio.scheduler import Policy, Scheduler
@@ -38,6 +46,7 @@ _AMPLE: Final = 0.75
 _MOST_FRAMES_AT_ONCE: Final = 8
 _UNOPENED_AT_LEAST: Final = 3  # frames; the first ones of a sender may have been missed
 _REQUEST_BYTES: Final = 12
+_FEEDBACK_BYTES: Final = 18
 _RESERVED_FRAMES: Final = 3
 _RESERVED_FRAME_BYTES: Final = 24
 _NAMES_BYTES: Final = 9
@@ -62,7 +71,10 @@ class RadioNet:
         self.profile = profile
         self.opener = opener
         self.scheduler = Scheduler(policy, number, codec.grid, relevance)
-        ask_s = 8 * profile.air_bytes(_REQUEST_BYTES) / profile.rate_bits_per_s
+        ask_s, feedback_s = (
+            8 * profile.air_bytes(size) / profile.rate_bits_per_s
+            for size in (_REQUEST_BYTES, _FEEDBACK_BYTES)
+        )
         station = Station(profile.name, number, relays, ask_s)
         self.correspondence = Correspondence(station, sealer.full_headers, codec.decode)
         self.meter = LinkMeter(profile.medium)
@@ -74,9 +86,7 @@ class RadioNet:
         self._bucket = TokenBucket(profile.rate_bits_per_s, profile.depth_bits, profile.pace_bits_per_s)
         self._resolution = resolution_for(policy.threshold_m / 2.0)
         self._cutter = Cutter()
-        self._references = References(codec.grid)
-        self._hearing = Hearing()
-        self._unresolved_told = 0
+        self._reception = Reception(codec.grid, f"{profile.name}|{number}", feedback_s)
         self._payload_limits: dict[int, int] = {}
         self._epoch = sealer.next_epoch()
 
@@ -130,26 +140,16 @@ class RadioNet:
 
     def _resolved(self, opened: Opened, content: Content, now_ns: int) -> Reports | None:
         """An update as the reports that it means to us; takes in what the sender tells of our own frames."""
-        sender, epoch, counter = opened.sender, opened.epoch, opened.counter
-        self._references.heard(sender, epoch, counter)
-        self.scheduler.listeners.heard_from(sender, now_ns)
-        if not isinstance(content, Reports | Update):
-            return None
-        if content.feedback is not None and content.feedback.about == self._number:
-            self.scheduler.told_what_was_heard(sender, content.feedback, now_ns)
-        if isinstance(content, Reports):
-            self._references.told(sender, epoch, counter, content, now_ns)
-            others = [report.number for report in content.reports if report.number != sender]
-            if others:
-                self._hearing.heard_telling(sender, epoch, counter, others)
-            return None
-        self._hearing.heard_telling(sender, epoch, counter, (entry.number for entry in content.entries))
-        return Reports(self._references.resolve(sender, epoch, counter, content, now_ns))
+        self.scheduler.listeners.heard_from(opened.sender, now_ns)
+        feedback = content.feedback if isinstance(content, Reports | Update) else content
+        if isinstance(feedback, Feedback) and feedback.about == self._number:
+            self.scheduler.told_what_was_heard(opened.sender, feedback, now_ns)
+        return self._reception.heard(opened, content, now_ns)
 
     @property
     def unresolved(self) -> int:
         """Soldiers in updates that said nothing to us, since we had missed too much."""
-        return self._references.unresolved
+        return self._reception.unresolved
 
     # -- speaking ---------------------------------------------------------------------------------------------
 
@@ -162,6 +162,7 @@ class RadioNet:
         try:
             if self._speak_notices(frames, now_ns):
                 self._speak_reports(frames, candidates, now_ns)
+                self._speak_feedback(frames, now_ns)
         except BootprintError:
             # Without fresh counters silence is the only safe thing; the next step tries again.
             self.counter_faults += 1
@@ -186,17 +187,24 @@ class RadioNet:
             self._epoch = self._sealer.next_epoch()
             self.scheduler.begin_again()
         for _ in range(_MOST_FRAMES_AT_ONCE):
-            urged = self._references.unresolved > self._unresolved_told
-            plan = self.scheduler.plan(candidates, self._room(now_ns), now_ns, urged=urged)
+            plan = self.scheduler.plan(candidates, self._room(now_ns), now_ns, urged=self._reception.urged)
             if plan is None:
                 return
-            feedback = self._hearing.due(self._references.in_order, self.scheduler.telling_of)
-            frame = self._transmit(self._fitting(replace(plan, feedback=feedback)), now_ns)
+            feedback = self._reception.feedback(self.scheduler.telling_of)
+            plan = self._fitting(replace(plan, feedback=feedback))
+            frame = self._transmit(plan, now_ns)
             if frame is None:
                 return
-            if feedback is not None:
-                self._hearing.sent(feedback)
-                self._unresolved_told = self._references.unresolved
+            if plan.feedback is not None:
+                self._reception.fed_back(plan.feedback, now_ns, alone=False)
+            frames.append(frame)
+
+    def _speak_feedback(self, frames: list[bytes], now_ns: int) -> None:
+        """What no report takes along, in a frame of its own."""
+        feedback = self._reception.lone_feedback(self.scheduler.telling_of, now_ns)
+        frame = None if feedback is None else self._transmit(feedback, now_ns)
+        if feedback is not None and frame is not None:
+            self._reception.fed_back(feedback, now_ns, alone=True)
             frames.append(frame)
 
     def _room(self, now_ns: int) -> Room:
@@ -292,8 +300,8 @@ class RadioNet:
 
     def set_back(self, by_ns: int) -> None:
         """The clock was set back by so much: all that is held in its time goes with it."""
-        self._references.clear()
-        for part in (self._bucket, self._sealer, self.scheduler, self.correspondence, self.meter):
+        parts = self._bucket, self._sealer, self.scheduler, self.correspondence, self.meter, self._reception
+        for part in parts:
             part.set_back(by_ns)
 
     # -- accounting -------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from bootprint.clock import NS_PER_S
 
 GROUP_KEY_BYTES: Final = 32
 OVERLAP_NS: Final = 24 * 3600 * NS_PER_S
-"""For so long after the roll-over frames sealed with the old key are opened still."""
+"""For so long after the roll-over frames sealed with the old key are opened still, unless that was lost."""
 TagBytes = Literal[4, 8]
 
 
@@ -64,19 +64,24 @@ class NetKeys:
 
 @dataclass(frozen=True, slots=True)
 class NextKey:
-    """The group key that takes over at ``from_ns``."""
+    """The group key that takes over at ``from_ns``; ``overlap_ns``: how long the old one is opened after that."""
 
     group_key: bytes
     from_ns: int
+    overlap_ns: int = OVERLAP_NS
 
 
 @dataclass(frozen=True, slots=True)
 class RollOver:
-    """An old key and a new one: senders change at ``from_ns``, receivers take both from now to a day after that."""
+    """An old key and a new one: senders change at ``from_ns``, receivers take both from now to the overlap's end.
+
+    Without overlap a lost key is worth nothing from that moment on.
+    """
 
     old: NetKeys
     new: NetKeys
     from_ns: int
+    overlap_ns: int = OVERLAP_NS
 
     @property
     def tag_bytes(self) -> TagBytes:
@@ -91,7 +96,7 @@ class RollOver:
         """Both, those that senders use first, until the overlap is over."""
         if now_ns < self.from_ns:
             return self.old, self.new
-        return (self.new, self.old) if now_ns < self.from_ns + OVERLAP_NS else (self.new,)
+        return (self.new, self.old) if now_ns < self.from_ns + self.overlap_ns else (self.new,)
 
 
 def keys_of(net: str, tag_bytes: TagBytes, group_key: bytes, next_key: NextKey | None) -> Keys:
@@ -99,4 +104,4 @@ def keys_of(net: str, tag_bytes: TagBytes, group_key: bytes, next_key: NextKey |
     keys = NetKeys(group_key, net, tag_bytes)
     if next_key is None:
         return keys
-    return RollOver(keys, NetKeys(next_key.group_key, net, tag_bytes), next_key.from_ns)
+    return RollOver(keys, NetKeys(next_key.group_key, net, tag_bytes), next_key.from_ns, next_key.overlap_ns)

@@ -114,6 +114,11 @@ class Offer:
         return list(zip(self.far[picked].tolist(), self.steady[picked].tolist(), strict=True))
 
 
+def may_pay(gain: FloatArray, terms: Terms) -> bool:
+    """Whether any frame could: a quick look, since most of the time none does."""
+    return float(np.maximum(gain - terms.price * LEAST_ENTRY_BITS, 0.0).sum()) > terms.frame_price
+
+
 def best_offer(wares: Wares, terms: Terms) -> Offer | None:
     """The frame with the largest surplus; None if no frame is worth its bits."""
     offers = [_in_full(wares, terms)]

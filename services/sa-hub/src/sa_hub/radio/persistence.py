@@ -18,6 +18,8 @@ LEAST_SHARE: Final = 0.5
 LONGEST_S: Final = 8
 """Ways are compared over as long as reports are apart, up to this."""
 _SAMPLE_S: Final = 1.0
+_PRIOR_M2_S2: Final = 0.1
+"""Of a velocity that nothing is known of yet, all lasts; the first ways soon outweigh that."""
 _STALE_S: Final = 20.0
 
 
@@ -36,8 +38,8 @@ class Persistence:
         self._latest_s = widened(self._latest_s, slots, axis=0, fill=-(1 << 40))
         self._samples = widened(self._samples, slots, axis=0)
         self._kept = widened(self._kept, slots, axis=0)
-        self._borne = widened(self._borne, slots, axis=0, fill=1)
-        self._told = widened(self._told, slots, axis=0, fill=1)
+        self._borne = widened(self._borne, slots, axis=0, fill=_PRIOR_M2_S2)
+        self._told = widened(self._told, slots, axis=0, fill=_PRIOR_M2_S2)
 
     def see(self, slots: IntArray, samples: FloatArray, horizon_s: float) -> None:
         """(n, 5) time s, latitude and longitude degrees, velocity east and north m/s, as known here."""

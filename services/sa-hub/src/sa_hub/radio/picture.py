@@ -115,7 +115,7 @@ _NEVER: Final = 1 << 40
 """So many frames behind is who never had an entry."""
 
 
-def widened(array: npt.NDArray[Any], length: int, axis: int, fill: int = 0) -> npt.NDArray[Any]:
+def widened(array: npt.NDArray[Any], length: int, axis: int, fill: float = 0) -> npt.NDArray[Any]:
     """``array`` with ``fill`` appended along an axis up to ``length``."""
     padding = [(0, 0)] * array.ndim
     padding[axis] = (0, max(0, length - array.shape[axis]))

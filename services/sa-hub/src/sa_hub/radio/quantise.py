@@ -123,6 +123,16 @@ def accuracy_code(accuracy_m: float) -> int:
     )
 
 
+def direction_code(azimuth_deg: float) -> int:
+    """The nearest 1/16 turn clockwise from true north, right to 11.25°."""
+    return round(azimuth_deg / 360.0 * DIRECTIONS) % DIRECTIONS
+
+
+def direction_deg(code: int) -> float:
+    """The azimuth of a direction's code, 0 to below 360."""
+    return code * 360.0 / DIRECTIONS
+
+
 def velocity_codes(east_m_s: float, north_m_s: float) -> tuple[int, int] | None:
     """(direction, speed) codes, None when standing.
 
@@ -131,7 +141,7 @@ def velocity_codes(east_m_s: float, north_m_s: float) -> tuple[int, int] | None:
     speed = math.hypot(east_m_s, north_m_s)
     if speed < STANDING_BELOW_M_S:
         return None
-    direction = round(math.atan2(east_m_s, north_m_s) / (2 * math.pi) * DIRECTIONS) % DIRECTIONS
+    direction = direction_code(math.degrees(math.atan2(east_m_s, north_m_s)))
     nearest = round(math.log(speed / SPEEDS_M_S[0]) / math.log(1.28))
     return direction, min(max(nearest, 0), len(SPEEDS_M_S) - 1)
 

@@ -7,17 +7,20 @@ entry of that soldier; if they are no more, its entry is one of those, and the p
 they are more, the entry is left out and counted: rather nothing than something wrong.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 from sa_hub.radio import quantise as q
-from sa_hub.radio.content import CONDITIONS, Entry, Level, Quality, Report, Reports, Update
+from sa_hub.radio.content import CONDITIONS, Entry, Facing, Level, Quality, Report, Reports, Update
 from sa_hub.radio.grid import Grid
-from sa_hub.radio.ground import moved_deg
+from sa_hub.radio.ground import METRES_PER_DEG, cosine, moved_deg, turn_deg
 from sa_hub.radio.replay import Heard
 from sa_hub.radio.update_codec import HEIGHT_MODULUS, TIME_MODULUS
 
 _CLOCK_SAMPLES: Final = 8
+_STAYS_M: Final = 4.0
+"""Who was told so near to where he was before may still face as he did."""
 
 
 @dataclass(slots=True)
@@ -159,7 +162,17 @@ def _at(
         north_m_s=velocity[1],
         cell_m=q.cell_m(resolution),
     )
+    report = replace(report, facing_deg=_facing_deg(reference, report, entry.facing))
     return _with_level(_with_quality(report, entry.quality), entry.level)
+
+
+def _facing_deg(before: Report, now: Report, facing: Facing | None) -> float | None:
+    """Where he faces: as told, else as before while he stands where he stood."""
+    if facing is not None:
+        return None if facing.direction is None else q.direction_deg(facing.direction)
+    if before.facing_deg is None or now.east_m_s or now.north_m_s:
+        return None
+    return before.facing_deg if _apart_m(before, now) < _STAYS_M else None
 
 
 def _with_quality(report: Report, quality: Quality | None) -> Report:
@@ -172,6 +185,12 @@ def _with_quality(report: Report, quality: Quality | None) -> Report:
         hops=quality.hops,
         condition=CONDITIONS[quality.condition],
     )
+
+
+def _apart_m(one: Report, other: Report) -> float:
+    north = one.latitude_deg - other.latitude_deg
+    east = turn_deg(one.longitude_deg - other.longitude_deg) * cosine(one.latitude_deg)
+    return math.hypot(north, east) * METRES_PER_DEG
 
 
 def _with_level(report: Report, level: Level | None) -> Report:

@@ -1,6 +1,7 @@
 """Telling in full again: for whoever can resolve nothing of a soldier, and does not say so.
 
-The first times soon, since a first frame may be missed, then after ever longer pauses.
+The first times soon, since a first frame may be missed, then after ever longer pauses. Where bits are dear one such
+frame takes what several updates need; where all say that they miss next to nothing the first time then comes later.
 """
 
 from collections.abc import Iterable
@@ -21,6 +22,8 @@ _LIMITS_S: Final = (60.0, 600.0)
 _FIRST_S: Final = (5.0, 1.0)
 _OVERDUE_S: Final = 20.0
 _CHEAP_PAUSE_S: Final = 15.0
+_DEAR: Final = 8.0
+"""Times what telling all in full takes of the budget is the first pause, where that is longer."""
 _OLD_NS: Final = 10 * NS_PER_S
 
 
@@ -48,10 +51,16 @@ class Refreshing:
         """Nobody was."""
         self._full_ns.clear()
 
-    def worth(self, who: Candidates, now_ns: int, longest_s: float, *, cheap: bool) -> FloatArray:
-        """(n,) of telling in full again; of an old report nothing, it will be told when it is newer."""
+    def worth(
+        self, who: Candidates, now_ns: int, longest_s: float, full_s: float, *, cheap: bool
+    ) -> FloatArray:
+        """(n,) of telling in full again; of an old report nothing, it will be told when it is newer.
+
+        ``full_s``: for how long telling all in full takes the whole budget.
+        """
+        first_s, longest_s = (max(pause_s, _DEAR * full_s) for pause_s in (_FIRST_S[cheap], longest_s))
         overdue = [
-            self._overdue(number, now_ns, _FIRST_S[cheap], longest_s) * (now_ns - report.time_ns < _OLD_NS)
+            self._overdue(number, now_ns, first_s, longest_s) * (now_ns - report.time_ns < _OLD_NS)
             for number, report in zip(who.numbers, who.reports, strict=True)
         ]
         return _WORTH * np.array(overdue, dtype=np.float64)

@@ -120,17 +120,19 @@ def _soldier_values(report: Report) -> dict[str, int]:
     """Motion, quality and detail: what own and squad reports have in common."""
     velocity = q.velocity_codes(report.east_m_s, report.north_m_s)
     direction, speed = velocity or (0, 0)
-    has_floor = report.floor is not None
+    has_floor, has_facing = report.floor is not None, report.facing_deg is not None
     return {
         "moving": int(velocity is not None),
         "direction": direction,
         "speed": speed,
         "accuracy": q.accuracy_code(report.accuracy_m),
         "mode": q.MODES.index(report.mode),
-        "detail": int(has_floor or report.condition != "ok"),
+        "detail": int(has_floor or has_facing or report.condition != "ok"),
         "condition": CONDITIONS.index(report.condition),
         "has_floor": int(has_floor),
         "floor": q.floor_code(report.floor or 0),
+        "has_facing": int(has_facing),
+        "facing": q.direction_code(report.facing_deg or 0.0),
     }
 
 
@@ -209,4 +211,5 @@ def _report(anchor: Anchor, offsets: Offsets, values: Values) -> Report:
         condition=CONDITIONS[values.get("condition", 0)],
         hops=values["hops"],
         cell_m=q.cell_m(anchor.resolution),
+        facing_deg=q.direction_deg(values["facing"]) if values.get("has_facing") else None,
     )

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 _ENTRY_BITS: Final = 18.0
+_FULL_ENTRY_BITS: Final = 32.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +20,10 @@ class Room:
     payload_bits: float
     frame_bits: float
     bits_per_bit: float = 1.0
+
+    def full_s(self, soldiers: int) -> float:
+        """For how long telling so many soldiers in full takes all of the budget."""
+        return (self.frame_bits + _FULL_ENTRY_BITS * self.bits_per_bit * soldiers) / self.rate_bits_per_s
 
     def interval_s(self, soldiers: int) -> float:
         """Time between two reports of a soldier, when so many share the budget."""

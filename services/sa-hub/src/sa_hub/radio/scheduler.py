@@ -21,16 +21,18 @@ from sa_hub.radio.ground import FloatArray
 from sa_hub.radio.history import History
 from sa_hub.radio.layout import MISSES
 from sa_hub.radio.listeners import LOSSLESS, Listeners
-from sa_hub.radio.offers import LEAST_ENTRY_BITS, MOTION_BITS, RESOLUTIONS, Terms, Wares, best_offer
+from sa_hub.radio.offers import MOTION_BITS, RESOLUTIONS, Terms, Wares, best_offer, may_pay
+from sa_hub.radio.outlook import Outlook
 from sa_hub.radio.pacing import Pacing
 from sa_hub.radio.persistence import LONGEST_S, Persistence
-from sa_hub.radio.picture import Spoken
+from sa_hub.radio.picture import BoolArray, Spoken
 from sa_hub.radio.references import resolved
 from sa_hub.radio.refreshing import Refreshing, longest_pause_s
 from sa_hub.radio.relevance import Relevance
 from sa_hub.radio.room import Room
 from sa_hub.radio.telling import FRESH_NS, Telling
-from sa_hub.radio.wares import Candidates, candidates_of, samples_of, worth
+from sa_hub.radio.wares import Candidates, candidates_of, samples_of
+from sa_hub.radio.worth import worth
 
 ENOUGH: Final = 0.12
 """Of the threshold: an error below it is worth no bits."""
@@ -41,6 +43,7 @@ CHEAP: Final = (math.exp(-4.0), math.exp(-5.0))
 CLOCK_SET_BACK_NS: Final = 60 * NS_PER_S
 STANDING_M_S: Final = 0.3
 _CHANGE_WORTH: Final = 3.0
+_TURN_WORTH: Final = 0.5
 _AGE_BITS: Final = 8.0
 _CHEAP_MISSES: Final = 3
 """Where bits are cheap, what is told is proof against surprises: more may be missed, all goes in full often."""
@@ -204,9 +207,8 @@ class Scheduler:
         telling = self._telling(news, room, now_ns)
         value, terms = self._worth(telling), self._terms(room)
         value += [urged * _URGED_WORTH * (number == self._own) for number in telling.who.numbers]
-        pause_s = longest_pause_s(self.listeners, cheap=self._is_cheap)
-        refresh = self._refreshing.worth(telling.who, now_ns, pause_s, cheap=self._is_cheap)
-        if not _may_pay(value.mean(axis=0) + refresh, terms):
+        refresh = self._refresh(telling, room)
+        if not may_pay(value.mean(axis=0) + refresh, terms):
             return None
         offer = best_offer(self._wares(telling, value, refresh), terms)
         if (
@@ -277,7 +279,9 @@ class Scheduler:
         velocity = np.where(np.hypot(*velocity.T)[:, None] < STANDING_M_S, 0.0, velocity)
         if self.listeners.loss >= LOSSLESS:
             velocity = self._history.as_told(slots, velocity)
-        return Telling(who, velocity, self._resolution(), now_ns, self._history, self._grid)
+        faces: BoolArray = (velocity == 0.0).all(axis=1) & self._is_cheap
+        outlook = Outlook(who, velocity, min(room.interval_s(len(reports)), LONGEST_S))
+        return Telling(outlook, faces, self._resolution(), now_ns, self._history, self._grid)
 
     @property
     def _is_cheap(self) -> bool:
@@ -293,10 +297,18 @@ class Scheduler:
         """(rows, n) of telling each soldier to each receiver."""
         policy, who = self._policy, telling.who
         enough_m = ENOUGH * policy.threshold_m
-        value = worth(who, telling.velocity, self.listeners.pictures, enough_m, policy.heartbeat_s)
+        value = worth(telling.outlook, self.listeners.pictures, enough_m, policy.heartbeat_s)
         weights = self.relevance.weights(who.numbers, who.latitude, who.longitude, telling.now_ns)
-        weighted: FloatArray = weights * (value + _CHANGE_WORTH * telling.urgent())
+        value = value + _CHANGE_WORTH * telling.urgent() + _TURN_WORTH * telling.turned()
+        weighted: FloatArray = weights * value
         return weighted
+
+    def _refresh(self, telling: Telling, room: Room) -> FloatArray:
+        """(n,) the worth of telling in full again; where all say that they miss next to nothing it is put off."""
+        pause_s = longest_pause_s(self.listeners, cheap=self._is_cheap)
+        heard = self.listeners.all_tell and self.listeners.loss < LOSSLESS
+        full_s = room.full_s(len(telling.who.reports)) if heard else 0.0
+        return self._refreshing.worth(telling.who, telling.now_ns, pause_s, full_s, cheap=self._is_cheap)
 
     def _wares(self, telling: Telling, value: FloatArray, refresh: FloatArray) -> Wares:
         who = telling.who
@@ -327,11 +339,6 @@ class Scheduler:
             entry_share=1.0 if loss < LOSSLESS else LOSSY_SHARE,
             least_misses=max(certain, _CHEAP_MISSES) if self._is_cheap else certain,
         )
-
-
-def _may_pay(gain: FloatArray, terms: Terms) -> bool:
-    """Whether any frame could: a quick look, since most of the time none does."""
-    return float(np.maximum(gain - terms.price * LEAST_ENTRY_BITS, 0.0).sum()) > terms.frame_price
 
 
 def _least_misses(loss: float) -> int:

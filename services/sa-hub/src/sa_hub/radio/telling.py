@@ -8,54 +8,62 @@ import numpy as np
 from bootprint.clock import NS_PER_S
 from sa_hub.radio import quantise as q
 from sa_hub.radio.content import Entry, Report, Reports, Update
-from sa_hub.radio.details import details_code, level_to_tell, quality_to_tell
+from sa_hub.radio.details import details_code, facing_to_tell, level_to_tell, quality_to_tell
 from sa_hub.radio.grid import Grid
-from sa_hub.radio.ground import METRES_PER_DEG, FloatArray, cosines, moved_deg
+from sa_hub.radio.ground import METRES_PER_DEG, FloatArray, cosines, turn_deg
 from sa_hub.radio.history import History
 from sa_hub.radio.offers import Offer
+from sa_hub.radio.outlook import Outlook
 from sa_hub.radio.picture import BoolArray
 from sa_hub.radio.squad import partition
-from sa_hub.radio.wares import Candidates, brief_s
+from sa_hub.radio.wares import Candidates
 
 FRESH_NS: Final = 2 * NS_PER_S
 """A report that is younger is told as of the frame's time, moved on; an older one with its age."""
-_AIM_S: Final = 1.0
-_AIM_CELL_M: Final = 2.4
 _FASTEST_ON_FOOT: Final = 9
 _QUALITY_BITS: Final = 10
 _LEVEL_BITS: Final = 3
 _FLOOR_BITS: Final = 7
 _HEIGHT_BITS: Final = 8
+_FACING_BITS: Final = 6
 _LEVEL_REPEATS: Final = 2
-"""Entries in which a new level is told at least; who misses them all has the old one until told in full again."""
+"""Entries in which a new level or facing is told at least; who misses them all has the old one until the next in
+full."""
 _HEIGHT_REACH_M: Final = 50.0
 """Of low bits that mean ±128 m, since a receiver may have stayed with an older height."""
 
 
 @dataclass(frozen=True)
 class Telling:
-    """All that could be told at one moment. ``velocity`` (n, 2) m/s and ``resolution`` as they would be told."""
+    """All that could be told at one moment. ``resolution`` as it would be told.
 
-    who: Candidates
-    velocity: FloatArray
+    ``faces`` (n,): whose facing is told: of who stands, where bits are cheap.
+    """
+
+    outlook: Outlook
+    faces: BoolArray
     resolution: int
     now_ns: int
     history: History
     grid: Grid
 
-    def aimed(self) -> tuple[FloatArray, FloatArray]:
-        """(n,) latitude and longitude to tell.
+    @property
+    def who(self) -> Candidates:
+        """Who could be told."""
+        return self.outlook.who
 
-        Who moves at a velocity that is not worth telling is told where the next second takes him, on coarse cells.
-        """
+    @property
+    def velocity(self) -> FloatArray:
+        """(n, 2) m/s as it would be told."""
+        return self.outlook.told
+
+    def aimed(self) -> tuple[FloatArray, FloatArray]:
+        """(n,) latitude and longitude to tell."""
         who = self.who
-        aim_s = _AIM_S * min(q.cell_m(self.resolution) / _AIM_CELL_M, 1.0)
-        age_s = who.now_s - who.time_s
-        ahead_s = brief_s(age_s + aim_s) - brief_s(age_s)
-        east_m, north_m = ahead_s * (who.velocity - self.velocity).T
+        east_m, north_m = self.outlook.aims_m.T
         longitude = who.longitude + east_m / (METRES_PER_DEG * cosines(who.latitude))
         latitude = np.clip(who.latitude + north_m / METRES_PER_DEG, -90.0, 90.0)
-        return latitude, (longitude + 180.0) % 360.0 - 180.0
+        return latitude, turn_deg(longitude)
 
     def out_of_reach(self) -> BoolArray:
         """(n,) whether the height cannot be told by its low bits: not known before, or far from it."""
@@ -70,12 +78,13 @@ class Telling:
         )
 
     def changes(self) -> BoolArray:
-        """(n, DEPTH, 2) whether quality and level are to be told to who may have missed so many entries."""
+        """(n, DEPTH, DETAILS) whether each detail is to be told to who may have missed so many entries."""
         told = self.history.told
         pairs = zip(self.who.slots.tolist(), self.who.reports, strict=True)
         codes = [details_code(report, told.get(slot)) for slot, report in pairs]
         differ = self.history.details_differ(self.who.slots, np.array(codes, dtype=np.int64))
-        differ[:, _LEVEL_REPEATS:, 1] = differ[:, _LEVEL_REPEATS - 1, 1, None]
+        differ[:, :, 2] &= self.faces[:, None]
+        differ[:, _LEVEL_REPEATS:, 1:] = differ[:, _LEVEL_REPEATS - 1, None, 1:]
         return differ
 
     def changes_bits(self) -> FloatArray:
@@ -86,6 +95,7 @@ class Telling:
                 _LEVEL_BITS
                 + _FLOOR_BITS * (each.floor is not None)
                 + _HEIGHT_BITS * (each.height_m is not None),
+                _FACING_BITS,
             )
             for each in self.who.reports
         ]
@@ -104,17 +114,33 @@ class Telling:
             dtype=np.bool_,
         )
 
+    def turned(self) -> BoolArray:
+        """(n,) who faces otherwise than last told, and may be told so."""
+        return self.changes()[:, 0, 2] if self.faces.any() else self.faces
+
     def in_full(self, offer: Offer) -> Reports:
         """As many of the chosen as fit beside the first against one anchor."""
+        latitude, longitude = self.aimed()
         picked = [
-            replace(
-                _as_of(self.who.reports[index], self.now_ns),
-                east_m_s=float(self.velocity[index, 0]),
-                north_m_s=float(self.velocity[index, 1]),
-            )
+            self._report(index, (float(latitude[index]), float(longitude[index])))
             for index in offer.picked.tolist()
         ]
         return Reports(tuple(partition(picked, self.resolution)[0]), tick=q.tick_of(self.now_ns))
+
+    def _report(self, index: int, place_deg: tuple[float, float]) -> Report:
+        """Told in full: a fresh report as of now, an older one as it is."""
+        report = self.who.reports[index]
+        if abs(self.now_ns - report.time_ns) <= FRESH_NS:
+            latitude_deg, longitude_deg = place_deg
+            report = replace(
+                report, time_ns=self.now_ns, latitude_deg=latitude_deg, longitude_deg=longitude_deg
+            )
+        return replace(
+            report,
+            east_m_s=float(self.velocity[index, 0]),
+            north_m_s=float(self.velocity[index, 1]),
+            facing_deg=report.facing_deg if self.faces[index] else None,
+        )
 
     def update(self, offer: Offer, misses: int) -> Update:
         """The chosen, for whoever missed no more than ``misses``."""
@@ -141,6 +167,7 @@ class Telling:
             age_ticks=_age_ticks(report, self.now_ns),
             quality=quality_to_tell(report, told) if changed[0] else None,
             level=level_to_tell(report, told) if changed[1] else None,
+            facing=facing_to_tell(report, told) if changed[2] else None,
         )
 
 
@@ -148,17 +175,6 @@ def _varied(entry: Entry, how: tuple[bool, bool]) -> Entry:
     """The entry with more bits of its place, or without velocity, as the frame's offer has it."""
     far, steady = how
     return replace(entry, far=far, steady=steady, velocity=None if steady else entry.velocity)
-
-
-def _as_of(report: Report, now_ns: int) -> Report:
-    """A fresh report moved on to now; an older one as it is."""
-    if abs(now_ns - report.time_ns) > FRESH_NS:
-        return report
-    velocity = report.east_m_s, report.north_m_s
-    latitude, longitude = moved_deg(
-        report.latitude_deg, report.longitude_deg, velocity, now_ns - report.time_ns
-    )
-    return replace(report, time_ns=now_ns, latitude_deg=latitude, longitude_deg=longitude)
 
 
 def _age_ticks(report: Report, now_ns: int) -> int:

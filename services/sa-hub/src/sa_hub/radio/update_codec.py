@@ -9,13 +9,12 @@ from typing import Final
 
 from sa_hub.radio import quantise as q
 from sa_hub.radio.bits import BitReader, BitWriter
-from sa_hub.radio.content import Entry, Feedback, Level, Quality, Update
+from sa_hub.radio.content import Entry, Facing, Level, Quality, Update
 from sa_hub.radio.errors import FrameError
 from sa_hub.radio.layout import (
     ENTRY,
     FAR_BITS,
     FAR_REACH,
-    FEEDBACK,
     LATTICES,
     MISSES,
     NEAR_BITS,
@@ -27,9 +26,6 @@ from sa_hub.radio.layout import (
 from sa_hub.radio.report_codec import MAX_NUMBER
 
 MAX_ENTRIES: Final = 64
-SPAN_STEP: Final = 4
-LONGEST_SPAN: Final = 8 * SPAN_STEP
-COUNTER_MODULUS: Final = 256
 _BESIDE: Final = 8
 TIME_MODULUS: Final = 1 << 8
 HEIGHT_MODULUS: Final = 1 << 8
@@ -101,30 +97,6 @@ def _read_entries(reader: BitReader, frame: Values, sender: int) -> Iterator[Ent
         yield _entry(number, read_fields(reader, ENTRY, frame))
 
 
-def write_feedback(writer: BitWriter, feedback: Feedback | None) -> None:
-    """Append what was heard of somebody's frames, if anything is to be told."""
-    if feedback is None:
-        return
-    values = {
-        "about": feedback.about,
-        "newest": feedback.newest % COUNTER_MODULUS,
-        "span": feedback.span // SPAN_STEP - 1,
-        "heard": feedback.heard,
-        "4 · span + 4": feedback.span,
-    }
-    write_fields(writer, FEEDBACK, values)
-
-
-def read_feedback(reader: BitReader) -> Feedback | None:
-    """What is told of our or others' frames; None if the payload ends here."""
-    if reader.left < 8:
-        return None
-    values = read_fields(reader, FEEDBACK[:3], {})
-    values["4 · span + 4"] = SPAN_STEP * (values["span"] + 1)
-    values = read_fields(reader, FEEDBACK[3:], values)
-    return Feedback(values["about"], values["newest"], values["4 · span + 4"], values["heard"])
-
-
 def best_gap_code(numbers: Sequence[int]) -> int:
     """The code of the Rice parameter that makes the gaps between these sorted numbers shortest."""
     gaps = [after - before - 1 for before, after in pairwise(numbers)]
@@ -139,7 +111,7 @@ def _reaches(reach: int) -> dict[str, int]:
 def _frame_values(update: Update, numbers: Sequence[int], sender: int) -> dict[str, int]:
     beside = numbers[0] - sender + _BESIDE
     paced = any(entry.velocity and entry.velocity[1] not in q.PACES for entry in update.entries)
-    detailed = any(entry.quality or entry.level for entry in update.entries)
+    detailed = any(entry.quality or entry.level or entry.facing for entry in update.entries)
     aged = any(entry.age_ticks for entry in update.entries)
     plain = not (paced or detailed or aged)
     gap_code = best_gap_code(numbers)
@@ -171,6 +143,7 @@ def _frame_values(update: Update, numbers: Sequence[int], sender: int) -> dict[s
 def _entry_values(entry: Entry, reach_bits: int, *, paced: bool) -> dict[str, int]:
     direction, speed = entry.velocity or (0, 0)
     quality, level = entry.quality or Quality(0, 0, 0, 0), entry.level or Level(None, None)
+    facing = None if entry.facing is None else entry.facing.direction
     return {
         "far": int(entry.far),
         "steady": int(entry.steady),
@@ -191,6 +164,9 @@ def _entry_values(entry: Entry, reach_bits: int, *, paced: bool) -> dict[str, in
         "floor": q.floor_code(level.floor or 0),
         "has_height": int(level.height_m is not None),
         "height": (level.height_m or 0) % HEIGHT_MODULUS,
+        "turned": int(entry.facing is not None),
+        "has_facing": int(facing is not None),
+        "facing": facing or 0,
     }
 
 
@@ -210,6 +186,7 @@ def _entry(number: int, values: Values) -> Entry:
         age_ticks=q.age_ticks(values.get("age", 0)),
         quality=_quality(values) if values.get("quality") else None,
         level=_level(values) if values.get("level") else None,
+        facing=Facing(values["facing"] if values["has_facing"] else None) if values.get("turned") else None,
         far=bool(values.get("far")),
         steady=bool(values.get("steady")),
     )

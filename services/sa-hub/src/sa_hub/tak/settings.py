@@ -41,7 +41,8 @@ class TakSettings(Config, frozen=True):
 
     A soldier's new report goes out at most every ``least_interval_s``, and every ``refresh_s`` without one. With
     ``receive`` others' units appear as foreign tracks and markers as observations; with ``tell_squad`` markers also
-    go to the squad by radio, as far as its budget allows.
+    go to the squad by radio, as far as its budget allows, and with ``tell_friends`` friends near our people as
+    observations: the nearest first, one each ``friends_every_s`` at most.
     """
 
     url: str = "udp://239.2.3.1:6969"
@@ -51,6 +52,9 @@ class TakSettings(Config, frozen=True):
     refresh_s: Positive = 15.0
     receive: bool = True
     tell_squad: bool = False
+    tell_friends: bool = False
+    friends_within_m: Positive = 1000.0
+    friends_every_s: Positive = 30.0
     interface: str = ""
     ca: str = ""
     cert: str = ""

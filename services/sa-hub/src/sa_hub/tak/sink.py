@@ -1,6 +1,6 @@
 """TAK as a companion of the hub: the squad goes out, others come in."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from bootprint.bus import Envelope
 from bootprint.display import Ages
@@ -8,6 +8,7 @@ from bootprint.messages import Status, Track
 from bootprint.service import Context
 from sa_hub.tak.event import to_xml
 from sa_hub.tak.foreign import Foreigners
+from sa_hub.tak.friends import Friends
 from sa_hub.tak.link import open_link
 from sa_hub.tak.protobuf import to_protobuf
 from sa_hub.tak.settings import TakSettings, endpoint_of
@@ -42,9 +43,10 @@ class TakSink:
         self._squad = Squad(computer.realm, settings, ages, exercise=exercise)
         observer = context.identity.soldier if settings.tell_squad else OBSERVER
         self._foreigners = Foreigners(context.identity, observer) if settings.receive else None
+        self._friends = Friends(context.identity, settings) if settings.tell_friends else None
         self._announce = announce
         self._now_ns = context.clock.now_ns
-        self._sent = 0
+        self._sent = self._told = 0
 
     def wants(self, envelope: Envelope) -> bool:
         """Tracks, and statuses for their batteries."""
@@ -54,19 +56,36 @@ class TakSink:
         """Tell what is new, listen to what has come."""
         for envelope in envelopes:
             self._squad.tell(envelope.message)
+            self._note(envelope)
         for event in self._squad.due(self._now_ns()):
             self._link.send(self._encode(event))
             self._sent += 1
+        for heard in self._heard():
+            self._note(heard)
+            self._announce(heard)
+        if self._friends is not None and (told := self._friends.due(self._now_ns())) is not None:
+            self._told += 1
+            self._announce(told)
+
+    def _heard(self) -> Iterator[Envelope]:
         if self._foreigners is not None:
             for data in self._link.receive():
                 heard = self._foreigners.hear(data, self._now_ns())
                 if heard is not None:
-                    self._announce(heard)
+                    yield heard
+
+    def _note(self, envelope: Envelope) -> None:
+        if self._friends is not None:
+            self._friends.hear(envelope.message)
 
     def counters(self) -> dict[str, int]:
-        """Events sent, and what became of those heard."""
+        """Events sent, friends told of by radio, and what became of events heard."""
         heard = {} if self._foreigners is None else self._foreigners.counters
-        return {"sent": self._sent, **{f"heard_{name}": count for name, count in heard.items()}}
+        return {
+            "sent": self._sent,
+            "friends_told": self._told,
+            **{f"heard_{name}": count for name, count in heard.items()},
+        }
 
     def close(self) -> None:
         """Close the connection."""

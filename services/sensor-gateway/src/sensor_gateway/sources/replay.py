@@ -123,7 +123,8 @@ class Replay:
         self._rates = RateMeter()
         self._position_ns = 0
         self._start_ns = 0
-        self._published: Counter[str] = Counter(messages=0, loops=0)
+        self._from_ns = 0
+        self._published: Counter[str] = Counter(messages=0, loops=0, skipped=0)
         self.finished = False
 
     def run(self) -> None:
@@ -165,6 +166,7 @@ class Replay:
     def _play_all(self, start_ns: int) -> bool:
         """Whether the replay came to its end (and was not stopped)."""
         numbering = _Numbering()
+        self._from_ns = self._context.clock.now_ns() if self._settings.skip_past else 0
         self._context.log.info("replay begins", path=self._settings.path, start_ns=start_ns)
         while self._play_once(start_ns, numbering):
             if not self._settings.loop:
@@ -179,6 +181,10 @@ class Replay:
         reached_ns = 0
         for envelope in self._recording.messages(start_ns):
             due = due_ns(envelope.message)
+            if due < self._from_ns:
+                numbering.renumbered(envelope)
+                self._published["skipped"] += 1
+                continue
             if due > reached_ns:
                 reached_ns = -(-due // self._beat_ns) * self._beat_ns
                 if not self._wait_until(reached_ns):

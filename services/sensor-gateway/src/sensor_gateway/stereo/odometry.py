@@ -65,6 +65,7 @@ class StereoOdometry:
         self._pose_ns = 0
         self._step = Pose.none()  # from the pair before to that one
         self._sequence = 0
+        self._told_start_ns: int | None = None  # of the newest motion
 
     def feed(self, time_ns: int, left: Pixels, right: Pixels) -> CameraMotion | Verdict:
         """Take the next pair: the motion since the key frame, or why there is none."""
@@ -180,6 +181,8 @@ class StereoOdometry:
         translation, rotation = _TO_BODY @ pose.place, _TO_BODY @ back.as_rotvec()
         covariance[:3, :3] += self._settings.scale_sigma**2 * float(translation @ translation) * np.eye(3)
         covariance[3:, 3:] += self._settings.turn_sigma**2 * float(rotation @ rotation) * np.eye(3)
+        landmarks = self._sure_landmarks(key) if self._told_start_ns != key.pair.time_ns else None
+        self._told_start_ns = key.pair.time_ns
         self._sequence += 1
         return CameraMotion(
             time_ns=time_ns,
@@ -189,7 +192,16 @@ class StereoOdometry:
             rotation_rad=_vector(rotation),
             covariance=upper_triangle(covariance / share**2),
             confidence_pct=100.0 * share,
+            landmarks_m=landmarks,
         )
+
+    def _sure_landmarks(self, key: _KeyFrame) -> tuple[Vector3, ...]:
+        """Some of the key frame's landmarks that are well placed, in body axes, spread over all of them."""
+        points = key.landmarks.points
+        spread = self._calibration.spread(points, key.landmarks.covariances)
+        sure = points[np.sqrt(spread[:, 2, 2]) < self._settings.told_landmark_sigma_m]
+        chosen = sure[:: 1 + len(sure) // self._settings.told_landmarks] @ _TO_BODY.T
+        return tuple(_vector(point) for point in chosen)
 
     # --- key frames --------------------------------------------------------------------------------------------
 

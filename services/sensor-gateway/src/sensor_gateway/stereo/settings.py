@@ -29,5 +29,7 @@ class OdometrySettings(Config, frozen=True):
     key_turn_rad: Positive = 0.2
     longest_key_s: Positive = 2.0
     longest_gap_s: Positive = 0.6  # without a motion: the key frame is given up, and the chain is broken
+    told_landmarks: Annotated[int, msgspec.Meta(ge=1, le=40)] = 30  # a key frame, at most, for maps of rooms
+    told_landmark_sigma_m: Positive = 0.3  # of their depth, at most
     scale_sigma: NonNegative = 0.002  # of the translation: calibration and matching err alike in all frames
     turn_sigma: NonNegative = 0.001  # of the rotation

@@ -68,6 +68,7 @@ class Altimeter:
         self._noise_m = _NOISE_M
         self._means: deque[_Sample | None] = deque(maxlen=_LAG_TICKS)  # of the ticks not settled yet
         self._before: Belief | None = None  # up to the newest settled tick, by nothing later
+        self._since: list[tuple[Belief, FloatArray]] = []  # of the ticks after it, with their likelihoods
         self._settled: Belief | None = None  # the same, by all that is known
         self._now: Belief | None = None
         self.reference_ns: int | None = None  # of the last height from outside
@@ -162,6 +163,17 @@ class Altimeter:
         belief, _ = advance(self._now, Tick(height_m, self._noise_m, self._cadence_hz(self._steps[-1])))
         return belief.climb
 
+    def climb_at(self, time_ns: int) -> Climb | None:
+        """What stairs there were then, by all that is known by now; None if that is longer ago than `LAG_S`."""
+        if self._zero_ns is None:
+            return None
+        tick = math.floor((time_ns - self._zero_ns) / _NS_PER_S / TICK_S)
+        index = tick - (self._next_tick - len(self._since))
+        if not 0 <= index < len(self._since):
+            return None
+        belief, _ = self._since[index]
+        return smoothed(belief, [likelihood for _, likelihood in self._since[index + 1 :]]).climb
+
     @property
     def slope_rate_m_s(self) -> float:
         """How fast a slope rises that is walked on now; 0 on anything else."""
@@ -203,11 +215,12 @@ class Altimeter:
         """From the settled tick to now, by the steps as they are known by now."""
         assert self._before is not None
         self._learn_noise()
-        belief, likelihoods = self._before, []
+        belief, self._since = self._before, []
         for index in range(len(self._means)):
             belief, likelihood = advance(belief, self._as_tick(index))
-            likelihoods.append(likelihood)
-        self._now, self._settled = belief, smoothed(self._before, likelihoods)
+            self._since.append((belief, likelihood))
+        self._now = belief
+        self._settled = smoothed(self._before, [likelihood for _, likelihood in self._since])
 
     def _learn_noise(self) -> None:
         """From what the newest tick differs by from the level that was walked on."""
@@ -275,6 +288,7 @@ class Altimeter:
         self._samples.clear()
         self._means.clear()
         self._before = self._settled = self._now = None
+        self._since.clear()
         self._next_tick = math.ceil(time_s / TICK_S)
 
     def _forget(self) -> None:

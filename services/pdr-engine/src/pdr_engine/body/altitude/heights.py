@@ -68,6 +68,10 @@ class Heights:
         """When a height last came from outside."""
         return None if self._altimeter is None else self._altimeter.reference_ns
 
+    def climb_at(self, time_ns: int) -> Climb | None:
+        """What stairs there were at a time not long ago, as it is known now."""
+        return None if self._altimeter is None else self._altimeter.climb_at(time_ns)
+
     def step(self, time_ns: int) -> Height | None:
         """A step ended; the height, None without fresh pressure."""
         altimeter = self._altimeter

@@ -4,11 +4,14 @@ import math
 from dataclasses import dataclass
 
 from bootprint.geomagnetism import EarthField
+from bootprint.messages import Float64Array
 from pdr_engine.body.azimuth.compass import Compass, Reading
 from pdr_engine.body.azimuth.heading import GyroAlone, Heading
+from pdr_engine.body.azimuth.online_calibration import OnlineCalibration
 from pdr_engine.body.azimuth.repeated import Repeated
 from pdr_engine.body.azimuth.sources import source_of
 from pdr_engine.body.settings import BodySettings
+from pdr_engine.body.steps.attitude import Rows
 from pdr_engine.body.steps.strides import Cut
 
 _UNSEEN_TURN_RAD = 1.0  # what a person may turn in a gap
@@ -33,9 +36,11 @@ class Bearings:
 
     def __init__(self, settings: BodySettings) -> None:
         self.compass = Compass(settings)
-        self._source = source_of(settings.azimuth, settings.heading)
+        self._method = (settings.azimuth, settings.heading)
+        self._source = source_of(*self._method)
         self._gyro = GyroAlone(settings.heading)
         self.repeated = Repeated(settings.deviations) if settings.deviation_map else None
+        self._online = OnlineCalibration(settings.heading) if settings.online_calibration else None
         self._heading: Heading | None = None
         self._rest_turn_rad_s = 0.0
         self._last: tuple[int, float] | None = None  # end and mean yaw of the last step
@@ -43,19 +48,26 @@ class Bearings:
     def know_earth_field(self, field: EarthField) -> None:
         """What the field should be here."""
         self.compass.know_earth_field(field)
+        if self._online is not None:
+            self._online.know_earth_field(field)
 
-    def step(self, cut: Cut, rest_turn_rad_s: float) -> Bearing:
-        """Go on by a step. ``rest_turn_rad_s``: see `Attitude`."""
+    def step(self, cut: Cut, rest_turn_rad_s: float, rows: Rows, reference: tuple[float, float]) -> Bearing:
+        """Go on by a step. ``rest_turn_rad_s``: see `Attitude`; ``rows``: its, of about now.
+
+        ``reference``: east and north part of the reference axis (`Ahead.reference`) in them.
+        """
         if self._last is not None and rest_turn_rad_s != self._rest_turn_rad_s:
-            self._source.unbias(rest_turn_rad_s - self._rest_turn_rad_s)
+            self._unbias(rest_turn_rad_s - self._rest_turn_rad_s)
         self._rest_turn_rad_s = rest_turn_rad_s
         before_ns, before_rad = self._last or (cut.end_ns, cut.yaw_rad)
         self._last = (cut.end_ns, cut.yaw_rad)
         turn_rad, since_s = cut.yaw_rad - before_rad, (cut.end_ns - before_ns) * 1e-9
-        reading = raw = self._read(cut, turn_rad, since_s)
+        field_ut = cut.field_ut if self._online is None else self._online.corrected(cut, rows, reference)
+        reading = raw = self._read(field_ut, turn_rad, since_s)
         if self.repeated is not None and raw is not None:
             reading = self.repeated.corrected(raw)
         self._heading = self._source.step(turn_rad, since_s, reading)
+        self._calibrate(cut, since_s, raw)
         if self.repeated is not None and raw is not None:
             self.repeated.learn(raw, self._heading)
         return Bearing(self._heading, self._gyro.step(turn_rad, since_s, reading), reading)
@@ -64,11 +76,27 @@ class Bearings:
         """The stream broke: nobody knows how far the unit turned."""
         self._source.lose(_UNSEEN_TURN_RAD)
         self._gyro.lose(_UNSEEN_TURN_RAD)
+        if self._online is not None:
+            self._online.iron.lose(_UNSEEN_TURN_RAD)
 
-    def _read(self, cut: Cut, turn_rad: float, since_s: float) -> Reading | None:
-        if cut.field_ut is None:
+    def _unbias(self, rate_rad_s: float) -> None:
+        self._source.unbias(rate_rad_s)
+        if self._online is not None:
+            self._online.iron.unbias(rate_rad_s)
+
+    def _calibrate(self, cut: Cut, step_s: float, reading: Reading | None) -> None:
+        """Learn the iron that is worn; when it is found, azimuth and drift that rested on it begin anew."""
+        if self._online is None:
+            return
+        found = self._online.learn(cut, step_s, reading is not None and not reading.disturbed)
+        if found is not None:
+            self._source = source_of(*self._method)
+            self._heading = self._source.step(0.0, 0.0, Reading(*found))
+
+    def _read(self, field_ut: Float64Array | None, turn_rad: float, since_s: float) -> Reading | None:
+        if field_ut is None:
             return None
         carried = None
         if self._heading is not None:
             carried = ((self._heading.azimuth_rad - turn_rad) % math.tau, self._heading.sigma_rad)
-        return self.compass.read(cut.field_ut, -turn_rad, since_s, carried)
+        return self.compass.read(field_ut, -turn_rad, since_s, carried)

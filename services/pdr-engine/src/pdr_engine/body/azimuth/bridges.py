@@ -195,7 +195,7 @@ class Bridged:
         else:
             self._bridge.advance(-turn_rad, step_s, max(1, round(step_s / CELL_S)))
             if reading is not None and self._takes(reading, turn_rad, step_s):
-                self._bridge.compass(reading.azimuth_rad, reading.sigma_rad)
+                self._bridge.compass(reading.azimuth_rad, self._sigma_rad(reading))
         return Heading(self._bridge.azimuth_rad % math.tau, min(UNKNOWN_RAD, self._bridge.sigma_rad))
 
     def lose(self, sigma_rad: float) -> None:
@@ -207,6 +207,10 @@ class Bridged:
         """See `heading.Source`."""
         if self._bridge is not None:
             self._bridge.unbias(rate_rad_s)
+
+    def _sigma_rad(self, reading: Reading) -> float:
+        """The Kalman filter averages steps, whose errors are alike; the others take single readings."""
+        return math.sqrt(reading.alike_variance) if self._kind is KalmanBridge else reading.sigma_rad
 
     def _takes(self, reading: Reading, turn_rad: float, step_s: float) -> bool:
         if abs(turn_rad) > QUICK_TURN_RAD_S * step_s:

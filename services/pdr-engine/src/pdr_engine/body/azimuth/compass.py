@@ -26,7 +26,8 @@ class Reading:
     """Azimuth of the reference axis, clockwise from magnetic north, and its sigma.
 
     ``trusted``: worth using at all; ``disturbed``: iron or currents are likelier than not. Errors last
-    for steps: ``lasting_variance`` is what each step would have if all were independent and averaged as slowly.
+    for steps: ``alike_variance`` is what each step would have if all were independent and averaged as slowly,
+    ``lasting_variance`` the same for who would rather keep a track's shape than have its azimuth soon.
     """
 
     azimuth_rad: float
@@ -34,6 +35,7 @@ class Reading:
     trusted: bool = True
     disturbed: bool = False
     lasting_variance: float = UNKNOWN_RAD**2
+    alike_variance: float = UNKNOWN_RAD**2
 
 
 def tilt_compensated(field_ut: Vector, pitch_rad: float, roll_rad: float) -> float:
@@ -132,14 +134,19 @@ class Compass:
         azimuth = field.azimuth_rad % math.tau
         if sigma is None:
             return Reading(azimuth, UNKNOWN_RAD, trusted=False, disturbed=verdict.disturbed)
-        lasting = self._lasting_variance() * (sigma / self._sigma_rad) ** 2
-        return Reading(azimuth, sigma, disturbed=verdict.disturbed, lasting_variance=lasting)
+        heading, share = self._heading, (sigma / self._sigma_rad) ** 2
+        lasting, alike = (
+            share * self._variance_of(steps) for steps in (heading.correlation_steps, heading.alike_steps)
+        )
+        return Reading(
+            azimuth, sigma, disturbed=verdict.disturbed, lasting_variance=lasting, alike_variance=alike
+        )
 
-    def _lasting_variance(self) -> float:
+    def _variance_of(self, alike_steps: float) -> float:
         """Of an undisturbed reading: tilt and sway last for some steps, iron for as long as a place is like this.
 
         How much iron there is shows in how uneven the field lately was; never more than buildings have.
         """
         heading = self._heading
         uneven = min(self._detector.unevenness, heading.disturbance_floor)
-        return heading.sway_steps * heading.compass_sigma_rad**2 + heading.correlation_steps * uneven**2
+        return heading.sway_steps * heading.compass_sigma_rad**2 + alike_steps * uneven**2

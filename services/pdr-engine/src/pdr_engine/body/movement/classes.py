@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from bootprint.messages import Direction, MotionClass
-from pdr_engine.body.movement.direction import DIRECTIONS, DirectionFilter
+from pdr_engine.body.movement.direction import DIRECTIONS, USUAL, WALKING, DirectionFilter
+from pdr_engine.body.movement.impetus import Impetus
 from pdr_engine.body.movement.surge import Surge, surge_of
-from pdr_engine.body.pieces import Stride
+from pdr_engine.body.pieces import FloatArray, Stride
 
 ClassName = Literal[
     "standing",
@@ -38,6 +39,7 @@ _STILL_M_S2, _STILL_SPREAD_M_S2 = 0.35, 0.06  # of the acceleration's RMS
 _RUN_BOUNCE_M_S2, _BOUNCE_SPREAD_M_S2 = 8.5, 1.2
 _RUN_HZ, _HZ_SPREAD = 2.25, 0.12
 _RUN_MEMORY, _MOST_RUN_EVIDENCE = 0.5, 2.5
+_CLIMBS_ASIDE = 0.1  # as often as forward
 _CRAWL_TILT_RAD, _TILT_SPREAD_RAD = math.radians(50.0), math.radians(6.0)
 
 
@@ -47,6 +49,16 @@ class Climb:
 
     stairs: float
     up: bool
+
+
+def motion_of(name: ClassName) -> MotionClass:
+    """The class by its name on the bus."""
+    return _MOTION.get(name, "walking")
+
+
+def direction_of(name: ClassName) -> Direction:
+    """Which way the feet go in a class."""
+    return name if name in ("backward", "left", "right") else "forward"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +73,7 @@ class Movement:
     @property
     def motion(self) -> MotionClass:
         """The class by its name on the bus."""
-        return _MOTION.get(self.name, "walking")
+        return motion_of(self.name)
 
 
 class MovementClassifier:
@@ -69,6 +81,8 @@ class MovementClassifier:
 
     def __init__(self) -> None:
         self.directions = DirectionFilter()
+        self._impetus = Impetus()
+        self._last_end_ns: int | None = None
         self._run_evidence = -_MOST_RUN_EVIDENCE
 
     def update(
@@ -89,11 +103,18 @@ class MovementClassifier:
         if running > 0.5 or not facing_known:
             self.directions.forward(stride.end_ns)
         else:
-            self.directions.update(surge, stride.turn_rad, stride.start_ns, stride.end_ns)
+            gained = self._gained(stride)
+            self.directions.update(surge, stride.turn_rad, stride.start_ns, stride.end_ns, gained)
         probability = self._shared(standing, running, crawling, climb)
         name = self._decided(probability)
-        direction: Direction = name if name in ("backward", "left", "right") else "forward"
-        return Movement(name, direction, probability, surge)
+        return Movement(name, direction_of(name), probability, surge)
+
+    def _gained(self, stride: Stride) -> FloatArray | None:
+        if stride.start_ns != self._last_end_ns:
+            self._impetus.restart()
+        self._last_end_ns = stride.end_ns
+        self._impetus.take(stride)
+        return self._impetus.transition(WALKING, USUAL)
 
     def _running(self, surge: Surge) -> float:
         """Probability of a run: bounce *and* cadence, over some steps, for a jolt has the one or the other."""
@@ -113,7 +134,7 @@ class MovementClassifier:
         left *= 1.0 - crawling
         shares["running"] = left * running
         left *= 1.0 - running
-        stairs = 0.0 if climb is None else climb.stairs
+        stairs = 0.0 if climb is None else self._ahead_only(climb.stairs)
         up = climb is not None and climb.up
         shares["stairs_up"], shares["stairs_down"] = (
             left * stairs * float(up),
@@ -123,6 +144,12 @@ class MovementClassifier:
         for name, share in zip(DIRECTIONS, self.directions.probability.tolist(), strict=True):
             shares[name] = left * share
         return shares
+
+    def _ahead_only(self, stairs: float) -> float:
+        """Stairs are climbed forward: their probability, given that of going any other way."""
+        forward = float(self.directions.probability[0])
+        likely = stairs * (forward + _CLIMBS_ASIDE * (1.0 - forward))
+        return likely / (likely + 1.0 - stairs) if likely > 0.0 else 0.0
 
     def _decided(self, probability: Mapping[ClassName, float]) -> ClassName:
         """The likeliest class; among the directions the one to go by."""

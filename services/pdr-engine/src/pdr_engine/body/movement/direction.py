@@ -26,12 +26,12 @@ _TURNS = np.array(
         [[0.0, -1.0], [1.0, 0.0]],
     ]
 )
-LAG = 2  # steps after which a direction is settled
+LAG = 4  # steps after which a direction is settled
 _NOTHING = np.ones(len(DIRECTIONS))  # the likelihood of a step that shows nothing
-_USUAL = np.array([0.88, 0.04, 0.04, 0.04])
-_CHANGE_WALKING, _CHANGE_AFTER_PAUSE = 0.006, 0.5  # a step
+USUAL = np.array([0.88, 0.04, 0.04, 0.04])
+_CHANGE_AFTER_PAUSE = 0.5  # a step
 _FORGET_UNTOLD = 0.5  # a step: who goes aside or back shows it at every step
-_DECIDED = 0.7
+_DECIDED = 0.6
 _PAUSE_NS = 700_000_000
 _FULL_SURGE = 0.7  # of the person's own going forward: from there the direction counts, not the size
 _SURGE_M_S2, _LEAST_SURGE_M_S2, _MOST_SURGE_M_S2 = 0.7, 0.4, 1.2  # chest, belt and hand, in any walk
@@ -45,6 +45,14 @@ _LEAST_BOUNCE_M_S2, _MOST_TURN_RAD = 0.6, math.radians(20.0)  # beyond them a st
 _SLOWEST_HZ, _FASTEST_HZ = 1.0, 2.8
 
 
+def _transition(change: float) -> FloatArray:
+    """Probabilities (4, 4) from row to column: with probability ``change`` people go on as they usually do."""
+    return np.asarray((1.0 - change) * np.eye(len(USUAL)) + change * USUAL)
+
+
+WALKING = _transition(0.006)
+
+
 class DirectionFilter:
     """Probabilities of `DIRECTIONS` after each step.
 
@@ -53,36 +61,44 @@ class DirectionFilter:
     """
 
     def __init__(self) -> None:
-        self.probability: FloatArray = _USUAL.copy()
+        self.probability: FloatArray = USUAL.copy()
         self.surge_m_s2: FloatArray = np.array([_SURGE_M_S2, 0.0])
         self.noise = _NOISE
         self._last_end_ns: int | None = None
         self._halted = True
-        self._past: deque[tuple[FloatArray, float, FloatArray]] = deque(maxlen=LAG + 1)
+        # Of the last steps: probabilities, likelihoods (4, 4) of how they came from those before, and likelihood.
+        self._past: deque[tuple[FloatArray, FloatArray, FloatArray]] = deque(maxlen=LAG + 1)
         self._bounce_m_s2 = _BOUNCE_M_S2
         self._before: Surge | None = None  # of the step that this one joins
 
-    def update(self, surge: Surge, turn_rad: float, start_ns: int, end_ns: int) -> FloatArray:
-        """Take one walked step in; the probabilities (4,) of its direction."""
-        change = _CHANGE_AFTER_PAUSE if self._paused(start_ns) else _CHANGE_WALKING
+    def update(
+        self, surge: Surge, turn_rad: float, start_ns: int, end_ns: int, gained: FloatArray | None = None
+    ) -> FloatArray:
+        """Take one walked step in; the probabilities (4,) of its direction.
+
+        ``gained`` (4, 4): how well the speed gained fits going from row to column, see `Impetus`.
+        """
+        paused = self._paused(start_ns)
+        change = _transition(_CHANGE_AFTER_PAUSE) if paused else (WALKING if gained is None else gained)
         before = self._before if start_ns == self._last_end_ns else None
         self._last_end_ns, self._before = end_ns, surge
         together = surge if before is None else _together(before, surge)
-        self._halted = not _is_plain(surge, together, turn_rad)
-        if self._halted:
+        plain = _is_plain(surge, together, turn_rad)
+        self._halted = not plain and not paused
+        if not plain:
             return self._step(change, _NOTHING)
         surge = together
         if not self._tells(surge):
-            return self._step(max(change, _FORGET_UNTOLD), _NOTHING)
+            return self._step(_transition(_FORGET_UNTOLD), _NOTHING)
         seen = _TURNS @ np.array([surge.ahead_m_s2, surge.left_m_s2])
         misses = self._misses(seen)
         self._step(change, self._likelihood(misses, float(np.sum(seen[0] ** 2))))
         self._learn(seen, float(misses.min()))
         return self.probability
 
-    def _step(self, change: float, likelihood: FloatArray) -> FloatArray:
-        """One step of the model: with probability ``change`` people go on as they usually do."""
-        posterior = ((1.0 - change) * self.probability + change * _USUAL) * likelihood
+    def _step(self, change: FloatArray, likelihood: FloatArray) -> FloatArray:
+        """One step of the model: ``change`` (4, 4) from row to column."""
+        posterior = (self.probability @ change) * likelihood
         self.probability = posterior / posterior.sum()
         self._past.append((self.probability, change, likelihood))
         return self.probability
@@ -95,15 +111,14 @@ class DirectionFilter:
     def forward(self, end_ns: int) -> FloatArray:
         """Take a step in that can only have gone forward (a run)."""
         self._last_end_ns, self._halted = end_ns, False
-        return self._step(1.0, np.array([1.0, 0.0, 0.0, 0.0]))
+        return self._step(_transition(1.0), np.array([1.0, 0.0, 0.0, 0.0]))
 
     def settled(self, lag: int) -> Direction:
         """The direction of the step ``lag`` (at most `LAG`) steps ago, by all steps since; now for lag 0."""
         past = list(self._past)
         told = np.ones(len(DIRECTIONS))  # likelihood of what came after, by direction
         for _, change, likelihood in past[len(past) - lag :][::-1]:
-            later = likelihood * told
-            told = (1.0 - change) * later + change * float(_USUAL @ later)
+            told = change @ (likelihood * told)
         smoothed = past[-1 - lag][0] * told
         return _decide(smoothed / smoothed.sum())
 

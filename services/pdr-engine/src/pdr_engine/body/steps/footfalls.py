@@ -4,17 +4,19 @@ The signal is smoothed without delay of phase by a Hann window of 0.26 s, so a p
 is the highest point between two troughs, each lower by the threshold, which follows the usual rise of this person;
 a second peak within half the usual interval belongs to the same step. What begins must be regular: gestures and a
 vehicle's jolts are not, so the first steps of a bout wait for the next two and are then all reported. A bout whose
-`rhythm` breaks is none, and the next one has to be even for longer.
+`rhythm` breaks is none, and the next one has to be even, and its strides alike, for longer.
 """
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from itertools import pairwise
-from statistics import median
+from statistics import mean, median
+from typing import Protocol
 
 from pdr_engine.body.settings import StepSettings
 from pdr_engine.body.steps.grid import CELL_NS
-from pdr_engine.body.steps.rhythm import EVEN, Rhythm, unevenness
+from pdr_engine.body.steps.rhythm import ALIKE, EVEN, Rhythm, unevenness
 
 _TAPS = 13
 _HANN = [0.5 - 0.5 * math.cos(2.0 * math.pi * (i + 1) / (_TAPS + 1)) for i in range(_TAPS)]
@@ -22,18 +24,32 @@ _WEIGHTS = [weight / sum(_HANN) for weight in _HANN]
 _DELAY_NS = (_TAPS // 2) * CELL_NS
 _REMEMBERED, _FEW = 8, 3
 _NS = 1e-9
+_TWO_STRIDES = 5  # peaks
+
+
+class AlikeStrides(Protocol):
+    """Who knows how the body moved (`pdr_engine.body.steps.strides`)."""
+
+    def likeness(self, peaks_ns: Sequence[int]) -> float:
+        """How alike the two strides between five peaks (UTC ns) are, -1 to 1."""
+        ...
 
 
 class Footfalls:
-    """Finds steps cell by cell; times are those of the peaks."""
+    """Finds steps cell by cell; times are those of the peaks.
 
-    def __init__(self, settings: StepSettings) -> None:
+    ``strides`` tell how alike the two strides between five peaks are; without them only the vertical is judged.
+    """
+
+    def __init__(self, settings: StepSettings, strides: AlikeStrides | None = None) -> None:
         self._settings = settings
+        self._strides = strides
         self._window: deque[float] = deque(maxlen=_TAPS)
         self._rises: deque[float] = deque(maxlen=_REMEMBERED)
         self._intervals_s: deque[float] = deque(maxlen=_REMEMBERED)
         self._waiting: list[int] = []
         self._last_ns: int | None = None  # of the bout that is going on
+        self._newest: deque[int] = deque(maxlen=_TWO_STRIDES)  # peaks of that bout
         self._rhythm = Rhythm()
         self._doubted_steps = 0  # until bouts begin as soon again
         self.refused = 0
@@ -49,6 +65,7 @@ class Footfalls:
     def _end_bout(self) -> None:
         self.refused += len(self._waiting)
         self._waiting, self._last_ns = [], None
+        self._newest.clear()
         self._rises.clear()
         self._intervals_s.clear()
 
@@ -114,32 +131,60 @@ class Footfalls:
     def _go_on(self, peak_ns: int, interval_s: float, rise: float) -> list[tuple[int, int]]:
         """Another step of the bout, unless it turns out to be no walk: then only many even steps are one."""
         assert self._last_ns is not None
-        if not self._rhythm.take(interval_s, rise, in_doubt=self._doubted_steps > 0):
+        self._newest.append(peak_ns)
+        if not self._rhythm.take(interval_s, rise, self._alike(self._newest), self._doubted_steps > 0):
             self._end_bout()
             self._doubted_steps = self._settings.steps_until_trusted
             self._waiting = [peak_ns]
             return []
-        self._doubted_steps = max(0, self._doubted_steps - 1)
+        self._doubted_steps = 0 if self._rhythm.proven else max(0, self._doubted_steps - 1)
         start_ns, self._last_ns = self._last_ns, peak_ns
         return [(start_ns, peak_ns)]
 
     def _begin_bout(self) -> list[tuple[int, int]]:
-        """Report what waited once enough steps in a row are regular; drop the oldest while they are not."""
-        settings = self._settings
-        wanted = settings.steps_in_doubt if self._doubted_steps else settings.steps_to_begin
-        if len(self._waiting) < wanted:
+        """Report what waited once enough steps in a row are a walk; drop the oldest while they are not."""
+        wanted = self._settings.steps_in_doubt if self._doubted_steps else self._settings.steps_to_begin
+        if not self._doubted_steps and self._is_regular(wanted):
+            self.refused += len(self._waiting) - wanted
+            del self._waiting[:-wanted]
+        elif len(self._waiting) < max(wanted, _TWO_STRIDES):
             return []
-        intervals = [(b - a) * _NS for a, b in pairwise(self._waiting)]
-        if not self._is_regular(intervals):
+        elif not self._repeats():
             self._waiting.pop(0)
             self.refused += 1
             return []
+        intervals = self._intervals()
         self._rhythm.restart(intervals)
         times = [self._waiting[0] - round(median(intervals) / _NS), *self._waiting]
+        self._newest.extend(self._waiting)
         self._waiting, self._last_ns = [], times[-1]
         return list(pairwise(times))
 
-    def _is_regular(self, intervals_s: list[float]) -> bool:
-        if self._doubted_steps:
-            return unevenness(intervals_s) < EVEN
-        return max(intervals_s) <= (1.0 + self._settings.irregularity) * min(intervals_s)
+    def _intervals(self) -> list[float]:
+        """Between the peaks that wait, s."""
+        return [(b - a) * _NS for a, b in pairwise(self._waiting)]
+
+    def _is_regular(self, count: int) -> bool:
+        """Whether the newest so many peaks come evenly."""
+        intervals = self._intervals()[1 - count :]
+        if len(intervals) < count - 1:
+            return False
+        return max(intervals) <= (1.0 + self._settings.irregularity) * min(intervals)
+
+    def _repeats(self) -> bool:
+        """Whether the strides that wait take as long and are alike; left and right steps need not be.
+
+        So begins a walk in doubt, and one whose trunk is shaken more by one foot than by the other.
+        """
+        waiting = self._waiting
+        spans = range(len(waiting) - _TWO_STRIDES + 1)
+        found = [self._alike(waiting[first : first + _TWO_STRIDES]) for first in spans]
+        known = [alike for alike in found if alike is not None]
+        alike = mean(known) > ALIKE if known else self._doubted_steps > 0
+        return alike and unevenness(self._intervals()) < EVEN
+
+    def _alike(self, peaks_ns: Sequence[int]) -> float | None:
+        """The likeness of the two strides between the peaks, if there are as many."""
+        if self._strides is None or len(peaks_ns) < _TWO_STRIDES:
+            return None
+        return self._strides.likeness(list(peaks_ns))

@@ -1,6 +1,7 @@
 """Cuts steps out of the level stream: what `gait`, `compass` and the classes look at."""
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from pdr_engine.body.pieces import Stride
 from pdr_engine.body.settings import Denoising
 from pdr_engine.body.steps.gait import Gait, gait_of
 from pdr_engine.body.steps.grid import CELL_NS, CELL_S, Cell
+from pdr_engine.body.steps.likeness import likeness
 
 # Of a cell: force (3), rate (3) and field (3) in the nav frame, yaw of the reference axis.
 WIDTH = 10
@@ -72,6 +74,17 @@ class Strides:
         self._cells: deque[Cell] = deque(maxlen=_KEPT)
         self._before: tuple[int, int] | None = None  # start and end of the last step cut
 
+    def __getstate__(self) -> tuple[Denoising, tuple[int, int] | None, int, Float64Array]:
+        """As one array: six hundred cells one by one would take longer to save than all the rest."""
+        first_ns = self._cells[0].time_ns if self._cells else 0
+        values = np.array([cell.values for cell in self._cells]).reshape(-1, WIDTH)
+        return self._denoising, self._before, first_ns, values
+
+    def __setstate__(self, state: tuple[Denoising, tuple[int, int] | None, int, Float64Array]) -> None:
+        self._denoising, self._before, first_ns, values = state
+        cells = (Cell(first_ns + i * CELL_NS, tuple(row)) for i, row in enumerate(values.tolist()))
+        self._cells = deque(cells, maxlen=_KEPT)
+
     def restart(self) -> None:
         """The stream broke."""
         self._cells.clear()
@@ -106,6 +119,17 @@ class Strides:
             turn_rate_rad_s=float(yaw[-1] - yaw[0]) / float(time_s[-1]),
             field_ut=field if known else None,
         )
+
+    def likeness(self, peaks_ns: Sequence[int]) -> float:
+        """How alike the stride from the first of five peaks to the third is to that from there to the last."""
+        first_ns, middle_ns, last_ns = peaks_ns[::2]
+        return likeness(self._motion(first_ns, middle_ns), self._motion(middle_ns, last_ns))
+
+    def _motion(self, start_ns: int, end_ns: int) -> Float64Array:
+        """Accelerations and rates (n, 6) along the reference axis, left of it, up."""
+        nav = self._between(start_ns, end_ns)
+        yaw = nav[:, _YAW]
+        return np.hstack([_levelled(nav[:, _ACCEL], yaw), _levelled(nav[:, _RATE], yaw)])
 
     def _first_of_two(self, start_ns: int) -> int:
         """Where the step before began, if this one joins it and all of it is at hand; else where this does."""

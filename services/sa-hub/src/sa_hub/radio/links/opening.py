@@ -4,18 +4,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from bootprint.keys.credentials import Credentials
 from sa_hub.radio.link_profile import LinkProfile
 from sa_hub.radio.links import Link
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a link may need of its computer: realm and number on a shared key, folder and event time for files."""
+    """What a link may need of its computer: realm, number and certificate at a shared router, folder and event
+    time for files."""
 
     realm: str
     number: int
     folder: Path
     now_ns: Callable[[], int]
+    credentials: Credentials | None = None
 
 
 def open_link(profile: LinkProfile, on_frame: Callable[[bytes], None], around: Surroundings) -> Link:
@@ -32,7 +35,7 @@ def open_link(profile: LinkProfile, on_frame: Callable[[bytes], None], around: S
         case "zenoh":
             from sa_hub.radio.links.zenoh_key import ZenohLink
 
-            return ZenohLink(profile, on_frame, around.realm, around.number)
+            return ZenohLink(profile, on_frame, around.realm, around.number, around.credentials)
         case "file":
             from sa_hub.radio.links.file_line import FileLink
 

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from typing import Final
 
 from bootprint.errors import BusError
+from bootprint.keys.credentials import Credentials
+from bootprint.topics import FRAMES
 from bootprint.zenoh_bus import ZenohBus, open_bus
 from sa_hub.radio.link_profile import LinkProfile
 
@@ -20,15 +22,21 @@ class ZenohLink:
     """One session at the net's router. ``realm`` and ``number`` are ours."""
 
     def __init__(
-        self, profile: LinkProfile, on_frame: Callable[[bytes], None], realm: str, number: int
+        self,
+        profile: LinkProfile,
+        on_frame: Callable[[bytes], None],
+        realm: str,
+        number: int,
+        credentials: Credentials | None,
     ) -> None:
         assert profile.router is not None
         self.name = profile.name
         self.send_faults = 0
         self.garbled = 0  # zenoh gives whole messages
         self._router = profile.router
+        self._credentials = credentials
         self._on_frame = on_frame
-        self._net = f"{realm}/@air1/{profile.name}"
+        self._net = f"{realm}/{FRAMES}/{profile.name}"
         self._own_key = f"{self._net}/{number}"
         self._bus: ZenohBus | None = None
         self._put: Callable[[bytes], None] | None = None
@@ -72,7 +80,12 @@ class ZenohLink:
     def _open(self) -> None:
         while self._bus is None and not self._stopping.is_set():
             with contextlib.suppress(BusError):
-                self._bus = open_bus(self._router, timeout_s=_PATIENCE_S, should_stop=self._stopping.is_set)
+                self._bus = open_bus(
+                    self._router,
+                    credentials=self._credentials,
+                    timeout_s=_PATIENCE_S,
+                    should_stop=self._stopping.is_set,
+                )
         if self._bus is not None:
             self._bus.subscribe_raw(f"{self._net}/*", self._arrived)
             self._put = self._bus.raw_publisher(self._own_key)
