@@ -112,6 +112,14 @@ def test_what_is_forgotten_is_told_in_full_again() -> None:
     assert [report.number for report in content.reports] == [2]
 
 
+def test_what_the_net_told_itself_is_told_to_who_asked_for_the_picture() -> None:
+    plan, leader = scheduler(), at(1, 40.0)
+    plan.told(at(2, 40.0, north_m=9.0))
+    assert tell(plan, [leader, at(2, 40.0, north_m=9.0)]) == [1]
+    plan.forget([1, 2])
+    assert set(tell(plan, [at(1, 40.5), at(2, 40.0, north_m=9.0)])) == {1, 2}
+
+
 def test_later_news_go_as_an_update_and_only_what_has_changed() -> None:
     plan = scheduler()
     tell(plan, [at(1, 0.0), at(2, 0.0, floor=1)])

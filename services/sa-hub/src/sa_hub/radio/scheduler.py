@@ -134,9 +134,10 @@ class Scheduler:
                 return (), None
 
     def forget(self, numbers: Iterable[int]) -> None:
-        """Take these as never told, so that they are reported anew and in full."""
+        """Take these as never told, by us or by others, so that they are reported anew and in full."""
         self._note_overheard()
         for number in numbers:
+            self._heard_ns.pop(number, None)
             self.listeners.forget(self._slot(number))
             self._history.forget(self._slot(number))
 
@@ -262,7 +263,6 @@ class Scheduler:
         if report.number != self._own or heard_ns - report.time_ns <= CLOCK_SET_BACK_NS:
             return False
         # What was said of ourselves and is much newer than what we know now is of a clock since set right.
-        del self._heard_ns[report.number]
         self.forget([report.number])
         return True
 
