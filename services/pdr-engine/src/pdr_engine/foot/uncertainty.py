@@ -28,9 +28,7 @@ COMMON_SLOPE = np.array(
     [0.0075, 0.0075, 0.0075, 0.0075, 0.015, 0.015]
 )  # 1 σ, of a step's length on the ground
 COMMON_TURN_RAD_S = 6.5e-4  # 1 σ: 2.2 °/min
-CUT_ALIKE = (
-    0.12  # of the angle that cut peaks may take along, as a turn: every stride of a gait cuts the same peak
-)
+CUT_ALIKE = 0.2  # as a turn, of the angle that cut peaks may take along: every stride cuts the same peak
 CUT_SHRINKS = 50.0  # of that angle's fourth power, as a scale error: nothing for runs, a quarter for sprints
 TAIL = 1.0  # ν
 MEASURED = 3.0  # components of the velocity
