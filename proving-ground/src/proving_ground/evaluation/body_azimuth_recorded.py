@@ -25,14 +25,13 @@ from proving_ground.evaluation.body_azimuth import (
     recorded_walks,
     wrapped,
 )
-from proving_ground.evaluation.body_azimuth_chain import rms_deg
+from proving_ground.evaluation.body_azimuth_chain import rms_deg, through
 from proving_ground.evaluation.body_strides import level_frames
 from sensor_gateway.recordings.run import ImuSeries
 
 METHODS = ("default", "a7")
 KINDS = ("none", "dipole", "cable")
 _AHEAD = np.array([1.0, 0.0, 0.0])
-_BATCH = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,15 +78,7 @@ def _steps(imu: ImuSeries, method: str) -> list[BodyStepEstimate]:
             azimuth=chosen.azimuth, heading=chosen.heading, retrace=False, classes=False, forward="x"
         )
     )
-    time_ns = np.round(imu.time_s * 1e9).astype(np.int64)
-    assert imu.mag_ut is not None
-    found = []
-    for start in range(0, len(time_ns), _BATCH):
-        part = slice(start, start + _BATCH)
-        found += navigator.process(
-            time_ns[part], imu.accel_m_s2[part], imu.gyro_rad_s[part], imu.mag_ut[part]
-        )
-    return found
+    return through(navigator, imu)
 
 
 def _truth(unaltered: Sequence[BodyStepEstimate]) -> FloatArray:

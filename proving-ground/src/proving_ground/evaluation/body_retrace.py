@@ -15,6 +15,7 @@ import typer
 from pdr_engine.body import BodyNavigator, BodySettings, BodyStepEstimate
 from pdr_engine.body.pieces import FloatArray
 from proving_ground.evaluation.body_azimuth import CENTRAL_EUROPE
+from proving_ground.evaluation.body_azimuth_chain import through
 from proving_ground.people import Itinerary, Leg, Person, move
 from proving_ground.sensors import Magnetics, Mounting, imu_class, measure_imu
 from sensor_gateway.recordings.run import ImuSeries
@@ -23,8 +24,6 @@ OUTWARD_M = np.array(
     [[0, 0, 0], [180, 70, 0], [390, 20, 0], [580, 40, 0], [740, 50, 0], [880, 90, 0], [1152, 237, 0]],
     dtype=np.float64,
 )
-_BATCH = 200
-_EARLY_S = 10.0  # simulated time begins at zero, batches of a stream may not
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,15 +62,7 @@ def _steps(imu: ImuSeries, retrace: bool) -> list[BodyStepEstimate]:
     """The chain's steps, of a navigator that knows the earth's field."""
     navigator = BodyNavigator(BodySettings(retrace=retrace))
     navigator.know_earth_field(CENTRAL_EUROPE)
-    time_ns = np.round((imu.time_s + _EARLY_S) * 1e9).astype(np.int64)
-    assert imu.mag_ut is not None
-    found = []
-    for start in range(0, len(time_ns), _BATCH):
-        part = slice(start, start + _BATCH)
-        found += navigator.process(
-            time_ns[part], imu.accel_m_s2[part], imu.gyro_rad_s[part], imu.mag_ut[part]
-        )
-    return found
+    return through(navigator, imu)
 
 
 def _final_error_m(steps: Sequence[BodyStepEstimate], true_m: FloatArray) -> float:

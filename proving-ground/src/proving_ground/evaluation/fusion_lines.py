@@ -80,7 +80,12 @@ def everything(_envelope: Envelope, _since_s: float) -> bool:
 
 def fused(heard: Heard, keep: Keep = everything, config: FusionConfig | None = None) -> list[Position]:
     """The positions of a fusion that hears what ``keep`` lets through."""
-    core = FusionCore(config or heard.config, heard.identity, heard.origin)
+    said = said_by(FusionCore(config or heard.config, heard.identity, heard.origin), heard, keep)
+    return [one.message for one in said if isinstance(one.message, Position)]
+
+
+def said_by(core: FusionCore, heard: Heard, keep: Keep = everything) -> list[Envelope]:
+    """All that a fusion says which is told what ``keep`` lets through, until it is closed."""
     out: list[Envelope] = []
     tick_ns = heard.begins_ns
     for due, envelope in heard.messages:
@@ -89,7 +94,7 @@ def fused(heard: Heard, keep: Keep = everything, config: FusionConfig | None = N
             tick_ns += TICK_NS
         if keep(envelope, (due - heard.begins_ns) / NS_PER_S):
             out += core.handle(envelope)
-    return [one.message for one in [*out, *core.close()] if isinstance(one.message, Position)]
+    return [*out, *core.close()]
 
 
 def scored(heard: Heard, positions: list[Position]) -> Row:

@@ -26,8 +26,7 @@ from bootprint.rooms import Place, RoomMap, cells_of, runs_of
 from fusion.engine import FusionCore
 from fusion.rooms.settings import RoomsConfig
 from pdr_engine.foot import warm_up
-from proving_ground.evaluation.fusion_lines import Heard, heard_in
-from proving_ground.exercises.line import TICK_NS
+from proving_ground.evaluation.fusion_lines import Heard, heard_in, said_by
 from proving_ground.exercises.score import compare
 from proving_ground.scenario import LIBRARY, Scenario, load_scenario
 from proving_ground.scenario.build import exercise_of, instrumented
@@ -56,22 +55,16 @@ class Played:
     counters: Mapping[str, int]
 
 
-def played(heard: Heard, told: Sequence[RoomMap] = ()) -> Played:
+def played(heard: Heard, given: Sequence[RoomMap] = ()) -> Played:
     """A fusion that hears a soldier's steps, and others' maps before all else."""
     config = msgspec.structs.replace(heard.config, rooms=RoomsConfig(use=True))
     core = FusionCore(config, heard.identity, heard.origin)
-    for rooms in told:
+    for rooms in given:
         core.handle(Envelope(heard.identity.address("rooms", rooms.soldier), rooms))
-    out: list[Envelope] = []
-    tick_ns = heard.begins_ns
-    for due, envelope in heard.messages:
-        while tick_ns <= due:
-            out += core.tick(tick_ns)
-            tick_ns += TICK_NS
-        out += core.handle(envelope)
-    out += core.close()
-    positions = [one.message for one in out if isinstance(one.message, Position)]
-    return Played(positions, core.survey.map(tick_ns), dict(core.counters))
+    said = said_by(core, heard)
+    positions = [one.message for one in said if isinstance(one.message, Position)]
+    ends_ns, _ = heard.messages[-1]
+    return Played(positions, core.survey.map(ends_ns), dict(core.counters))
 
 
 def house_search() -> Scenario:
