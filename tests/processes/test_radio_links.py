@@ -105,12 +105,19 @@ def test_hubs_speak_over_a_slow_serial_line_with_noise_on_it(tmp_path: Path, bau
 
         noisy_at_s = begin_s
 
-        def heard_in_spite_of_noise() -> bool:
+        def make_noise() -> None:
             nonlocal noisy_at_s
             if time.monotonic() > noisy_at_s:
                 line.inject(1, noise.randbytes(noise.randrange(1, 30)))
                 noisy_at_s = time.monotonic() + noise.expovariate(1.0)
+
+        def heard_in_spite_of_noise() -> bool:
+            make_noise()
             return len({track.time_ns for track in cp.tracks if track.soldier == "a1"}) >= 12
+
+        def noise_is_counted() -> bool:
+            make_noise()  # what came before the modem was opened, nobody could hear
+            return bool(cp.health) and cp.health[-1].counters["link_garbled"] > 0
 
         wait_until(heard_in_spite_of_noise, timeout_s=25.0, what="twelve reports")
         passed = list(line.ends[0].passed)
@@ -118,7 +125,7 @@ def test_hubs_speak_over_a_slow_serial_line_with_noise_on_it(tmp_path: Path, bau
         depth = min(max(4000, 2 * rate), 40 * rate)
         assert law_breaks(counted[:: max(1, len(counted) // 500)], rate, depth) == []
         assert 8 * len(passed) <= rate * (passed[-1][0] - begin_s)
-        wait_until(lambda: cp.health and cp.health[-1].counters["link_garbled"] > 0, what="noise is counted")
+        wait_until(noise_is_counted, what="noise is counted")
         line.unplug(1)
         wait_until(lambda: cp.health[-1].state == "degraded", what="the unplugged modem is told")
         line.plug(1)
