@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 
 from proving_ground.exercises.emulated_radio import Air, EmulatedNet, NetProfile
-from support.waiting import wait_until
+from support.waiting import PATIENCE_S, wait_until
 
 FAST = NetProfile("test", rate_bits_per_s=1e6, latency_s=0.0)
 
@@ -21,7 +21,7 @@ def on_air(
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(members)]
     for each in sockets:
         each.bind(("127.0.0.1", 0))
-        each.settimeout(5.0)
+        each.settimeout(PATIENCE_S)
     net = EmulatedNet(profile, {f"m{n}": each.getsockname()[1] for n, each in enumerate(sockets)}, speed)
     net.start()
     try:

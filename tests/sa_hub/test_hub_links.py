@@ -12,6 +12,7 @@ from sa_hub.radio.links.udp import UdpLink
 from sa_hub.settings import LinkProfile
 from support.hub_squad import START_NS, S, Walk, hub, position
 from support.link_ears import Ears
+from support.waiting import PATIENCE_S
 
 GROUP = "239.255.77.7"
 
@@ -43,7 +44,7 @@ def test_a_datagram_reaches_every_peer_unchanged(opened: Make) -> None:
     for data in (b"\x00\xff one", b"", bytes(1400)):
         mouth.send(data)
         for _, inbox in ears:
-            assert inbox.get(timeout=5) == data
+            assert inbox.get() == data
     assert mouth.send_faults == 0
 
 
@@ -53,8 +54,8 @@ def test_a_multicast_group_is_heard_by_all_its_members(opened: Make) -> None:
     one, one_hears = opened(profile(**options))
     _, two_hears = opened(profile(**options))
     one.send(b"to all")
-    assert two_hears.get(timeout=5) == b"to all"
-    assert one_hears.get(timeout=5) == b"to all"  # its own echo, which the hub knows by its sender
+    assert two_hears.get() == b"to all"
+    assert one_hears.get() == b"to all"  # its own echo, which the hub knows by its sender
 
 
 def test_a_peer_that_is_not_there_does_no_harm(opened: Make) -> None:
@@ -63,7 +64,7 @@ def test_a_peer_that_is_not_there_does_no_harm(opened: Make) -> None:
     mouth, _ = opened(profile(bind="127.0.0.1:0", peers=(f"127.0.0.1:{nobody}", f"127.0.0.1:{ear.port}")))
     for index in range(3):
         mouth.send(b"%d" % index)
-    assert [inbox.get(timeout=5) for _ in range(3)] == [b"0", b"1", b"2"]
+    assert [inbox.get() for _ in range(3)] == [b"0", b"1", b"2"]
 
 
 def test_what_the_system_refuses_to_send_is_counted(opened: Make) -> None:
@@ -105,7 +106,7 @@ def test_every_peers_copy_is_paid_for() -> None:
         for ear in ears:
             stack.enter_context(ear)
             ear.bind(("127.0.0.1", 0))
-            ear.settimeout(5.0)
+            ear.settimeout(PATIENCE_S)
         peers = tuple(f"127.0.0.1:{ear.getsockname()[1]}" for ear in ears)
         link_profile = profile(bind="127.0.0.1:0", peers=peers)
         link = UdpLink(link_profile, lambda data: None)

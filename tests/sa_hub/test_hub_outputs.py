@@ -23,6 +23,7 @@ from sa_hub.outputs.nmea import sentences
 from sa_hub.outputs.nmea_sink import NmeaSink, Served
 from sa_hub.outputs.settings import NmeaSettings, address_of
 from support.messages import quick
+from support.waiting import PATIENCE_S
 
 S = 1_000_000_000
 T0 = 1_760_000_000 * S + 250_000_000
@@ -164,7 +165,7 @@ def test_whoever_connects_is_told_and_whoever_leaves_is_forgotten() -> None:
         one, two = (socket.create_connection(("127.0.0.1", served.port)) for _ in range(2))
         served.write(b"first")
         for each in (one, two):
-            each.settimeout(10)
+            each.settimeout(PATIENCE_S)
             assert each.recv(5) == b"first"
         one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         one.close()  # resets, so that the server knows at once

@@ -12,7 +12,7 @@ from sa_hub.radio.link_profile import LinkProfile
 from sa_hub.radio.links.framing import framed
 from sa_hub.radio.links.serial_line import SerialLink
 from support.serial_pair import BITS_PER_BYTE, SerialPair
-from support.waiting import wait_until
+from support.waiting import PATIENCE_S, wait_until
 
 BAUD = 9600
 GUARD_S = 0.05
@@ -61,9 +61,9 @@ def modems(tmp_path: Path) -> Iterator[Modems]:
 def test_frames_cross_unchanged_both_ways(modems: Modems) -> None:
     for frame in (b"\x00\x00", bytes(range(250)), b"last"):
         modems.say(0, frame)
-        assert modems.heard[1].get(timeout=5) == frame
+        assert modems.heard[1].get(timeout=PATIENCE_S) == frame
         modems.say(1, frame[::-1])
-        assert modems.heard[0].get(timeout=5) == frame[::-1]
+        assert modems.heard[0].get(timeout=PATIENCE_S) == frame[::-1]
     assert [link.send_faults for link in modems.links] == [0, 0]
     assert [link.garbled for link in modems.links] == [0, 0]
 
@@ -78,7 +78,7 @@ def test_a_link_is_busy_until_the_line_has_carried_its_frame(modems: Modems) -> 
     assert time.monotonic() - begin_s >= on_line_s
     last_left_s = modems.line.ends[0].passed[-1][0]
     assert last_left_s <= time.monotonic()
-    assert modems.heard[1].get(timeout=5) == frame
+    assert modems.heard[1].get(timeout=PATIENCE_S) == frame
 
 
 def test_a_second_frame_is_refused_while_one_waits(modems: Modems) -> None:
@@ -86,7 +86,7 @@ def test_a_second_frame_is_refused_while_one_waits(modems: Modems) -> None:
     wait_until(lambda: modems.links[0].busy, what="the noise is heard")
     modems.links[0].send(b"first")
     modems.links[0].send(b"second")
-    assert modems.heard[1].get(timeout=5) == b"first"
+    assert modems.heard[1].get(timeout=PATIENCE_S) == b"first"
     assert modems.links[0].send_faults == 1
 
 
@@ -95,18 +95,18 @@ def test_nobody_speaks_while_the_other_is_heard(modems: Modems) -> None:
     modems.links[0].send(bytes(200))
     wait_until(lambda: len(modems.line.ends[0].passed) > 20, what="the first bytes are through")
     modems.links[1].send(b"me too")
-    assert modems.heard[0].get(timeout=5) == b"me too"
+    assert modems.heard[0].get(timeout=PATIENCE_S) == b"me too"
     others_end_s = modems.line.ends[0].passed[-1][0]
     first_of_ours_s = modems.line.ends[1].passed[0][0]
     assert first_of_ours_s > others_end_s + GUARD_S
-    assert modems.heard[1].get(timeout=5) == bytes(200)
+    assert modems.heard[1].get(timeout=PATIENCE_S) == bytes(200)
 
 
 def test_noise_is_counted_and_costs_no_frame(modems: Modems) -> None:
     for index in range(5):
         modems.line.inject(1, b"\x13\x37\xffnoise" * (index + 1))
         modems.say(0, b"frame %d" % index)
-        assert modems.heard[1].get(timeout=5) == b"frame %d" % index
+        assert modems.heard[1].get(timeout=PATIENCE_S) == b"frame %d" % index
     assert modems.links[1].garbled == 5
 
 
@@ -120,6 +120,6 @@ def test_an_unplugged_modem_is_busy_and_comes_back_by_itself(modems: Modems) -> 
     modems.line.plug(1)
     wait_until(lambda: not link.busy, what="the port is open again")
     modems.say(0, b"welcome back")
-    assert modems.heard[1].get(timeout=5) == b"welcome back"
+    assert modems.heard[1].get(timeout=PATIENCE_S) == b"welcome back"
     modems.say(1, b"here I am")
-    assert modems.heard[0].get(timeout=5) == b"here I am"
+    assert modems.heard[0].get(timeout=PATIENCE_S) == b"here I am"

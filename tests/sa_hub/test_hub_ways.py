@@ -52,10 +52,10 @@ def test_frames_stand_in_the_file_with_their_event_time(opened: Make, tmp_path: 
     one, one_hears = opened(kind="file", path="air.txt")
     two, two_hears = opened(kind="file", path="air.txt")
     one.send(b"\x00\xff\n frame")
-    assert two_hears.get(timeout=5) == b"\x00\xff\n frame"
-    assert one_hears.get(timeout=5) == b"\x00\xff\n frame"  # its own echo, which the hub knows by its sender
+    assert two_hears.get() == b"\x00\xff\n frame"
+    assert one_hears.get() == b"\x00\xff\n frame"  # its own echo, which the hub knows by its sender
     two.send(b"")
-    assert one_hears.get(timeout=5) == b""
+    assert one_hears.get() == b""
     text = (tmp_path / "air.txt").read_bytes()
     assert text == b"%d 00ff0a206672616d65\n%d \n" % (NOW_NS, NOW_NS)
     assert list(frames_in(text)) == [(NOW_NS, b"\x00\xff\n frame"), (NOW_NS, b"")]
@@ -72,7 +72,7 @@ def test_what_stood_in_the_file_before_is_not_heard_and_bad_lines_are_passed_ove
         for piece in (b"nonsense\n3 xyz\n\xff\xfe 00\n", whole[:4], whole[4:]):
             file.write(piece)
             file.flush()
-    assert heard.get(timeout=5) == b"new"
+    assert heard.get() == b"new"
     assert heard.empty()
     assert made.garbled == 3
 
@@ -86,7 +86,7 @@ def test_two_pipes_join_a_hub_to_a_planners_program(opened: Make, tmp_path: Path
         assert pipe.readline() == line_of(NOW_NS, b"from the hub")
     with (tmp_path / "in").open("wb") as pipe:
         pipe.write(line_of(7, b"from the planner"))
-    assert heard.get(timeout=5) == b"from the planner"
+    assert heard.get() == b"from the planner"
 
 
 def test_a_pipe_that_nobody_reads_loses_frames_and_says_so(opened: Make, tmp_path: Path) -> None:
@@ -119,7 +119,7 @@ def test_frames_pass_through_the_nets_router_and_past_every_selector_of_the_bus(
         bus.subscribe_raw("**", lambda key, _: seen.append(key))
         wait_until(lambda: not one.busy and not two.busy, what="both are at the router")
         wait_until(lambda: (one.send(b"\x00frame"), not two_hears.empty())[1], what="the subscription stands")
-        assert two_hears.get(timeout=5) == b"\x00frame"
+        assert two_hears.get() == b"\x00frame"
         assert one_hears.empty()
         assert seen == []
 

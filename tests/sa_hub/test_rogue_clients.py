@@ -130,7 +130,7 @@ def _hub(computer: Computer) -> Iterator[None]:
     try:
         yield
         process.terminate()
-        assert process.wait(timeout=10) == 0
+        assert process.wait(timeout=30) == 0
     finally:
         process.kill()
         process.wait()

@@ -27,7 +27,7 @@ from sa_hub.tak.settings import TakSettings
 from sa_hub.tak.sink import TakSink
 from support.certificates import write_certificates
 from support.hub_processes import CP, write_computer, write_realm
-from support.waiting import wait_until
+from support.waiting import PATIENCE_S, wait_until
 
 pytestmark = [
     pytest.mark.processes,
@@ -76,7 +76,7 @@ cert_db={tmp_path}/certificates.txt
         yield f"{request.param}://127.0.0.1:{port}"
     finally:
         process.terminate()
-        process.wait(timeout=10)
+        process.wait(timeout=30)
 
 
 def answers(port: int) -> bool:
@@ -186,7 +186,7 @@ def test_a_server_that_comes_back_is_connected_to_again(tmp_path: Path) -> None:
         with closing(sink(tmp_path, f"tcp://127.0.0.1:{port}", lambda _: None)) as ours:
             ours.take([track()])
             accepted, _ = first.accept()
-            accepted.settimeout(10)
+            accepted.settimeout(PATIENCE_S)
             assert b"bootprint-bp-a1" in accepted.recv(4096)
             accepted.close()
             with pytest.raises(OSError, match=r"closed the connection|reset"):

@@ -15,7 +15,7 @@ from sensor_gateway.intake import Intake
 from sensor_gateway.settings import Sensor, SerialSource
 from sensor_gateway.sources.serial import SerialReader
 from support.sensor_device import MavlinkSender, PtyDevice, nmea
-from support.waiting import wait_until
+from support.waiting import PATIENCE_S, wait_until
 
 A1 = Identity("bp", "alpha", "a1")
 
@@ -44,7 +44,7 @@ class Rig:
     def wait_for(self, condition: Callable[[], bool]) -> None:
         """Take what the reader hands over until the condition holds."""
         while not condition():
-            self.envelopes += self.waiting.get(timeout=10.0)()
+            self.envelopes += self.waiting.get(timeout=PATIENCE_S)()
 
     def wait_open(self, times: int) -> None:
         """Opening a port throws away what came before it."""

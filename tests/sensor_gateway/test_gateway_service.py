@@ -26,7 +26,7 @@ from sensor_gateway.sources.replay import DEFAULT_START_NS, run_messages
 from support.routers import running_router
 from support.sensor_device import UTC_NS, MavlinkSender, PtyDevice
 from support.ubx_receiver import pvt_at
-from support.waiting import wait_until
+from support.waiting import PATIENCE_S, wait_until
 
 A1 = Identity("bp", "alpha", "a1")
 REALM = """
@@ -87,7 +87,7 @@ def test_an_unplugged_sensor_is_degraded_and_a_stop_loses_nothing(tmp_path: Path
     wait_until(lambda: part.figures().counters["serial0.bytes"] == len(frames))
     out: list[Envelope] = []
     while (part.figures().counters.get("serial0.frames", 0)) < 8:
-        job = world.inbox.get(timeout=5.0)
+        job = world.inbox.get(timeout=PATIENCE_S)
         assert callable(job)
         out += job()
     figures = part.figures()
@@ -115,7 +115,7 @@ def test_a_receiver_tells_how_wrong_the_computer_s_clock_is(tmp_path: Path) -> N
             for second in range(8):
                 host_ns[0] = UTC_NS + (3600 + second) * S
                 sender.sendto(pvt_at(UTC_NS + second * S), ("127.0.0.1", port))
-                job = world.inbox.get(timeout=5.0)
+                job = world.inbox.get(timeout=PATIENCE_S)
                 assert callable(job)
                 assert [envelope.message.time_ns for envelope in job()] == [UTC_NS + second * S]
                 assert list(part.tick(host_ns[0])) == []

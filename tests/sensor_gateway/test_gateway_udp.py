@@ -15,6 +15,7 @@ from sensor_gateway.intake import Intake
 from sensor_gateway.settings import Sensor, UdpSource
 from sensor_gateway.sources.udp import UdpReader
 from support.sensor_device import MavlinkSender
+from support.waiting import PATIENCE_S
 
 SETTINGS = UdpSource(port=0, imus=(Sensor(system=1, place="body"),))
 
@@ -31,7 +32,7 @@ def test_datagrams_are_one_stream_even_if_a_bridge_cuts_frames() -> None:
         for begin, end in pairwise(cuts):
             sender.sendto(stream[begin:end], ("127.0.0.1", reader.port))
     intake = Intake(Identity("bp", "alpha", "a1"), SETTINGS)
-    envelopes = [envelope for _ in range(5) for envelope in intake.feed(*received.get(timeout=10.0))]
+    envelopes = [envelope for _ in range(5) for envelope in intake.feed(*received.get(timeout=PATIENCE_S))]
     stop.set()
     thread.join(5.0)
     assert not thread.is_alive()

@@ -58,7 +58,7 @@ def running_echo(config: Path, router: str, *extra: str) -> Iterator[tuple[subpr
 
 
 def end_of(process: subprocess.Popen[str]) -> tuple[int, str]:
-    _, errors = process.communicate(timeout=15)
+    _, errors = process.communicate(timeout=45)
     return process.returncode, errors
 
 

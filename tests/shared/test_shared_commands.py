@@ -155,7 +155,7 @@ def test_a_signal_ends_a_recording_with_all_that_was_heard(
                 sender.publish(pressure(sequence))
             wait_until(lambda: pressure(49).message in heard, what="the last message")
         recorder.send_signal(number)
-        assert recorder.wait(timeout=10) == 0
+        assert recorder.wait(timeout=30) == 0
     recorded = [e.message for _, e in Recording(out).envelopes("bp/@v1/alpha/a3/pressure/*")]
     assert recorded == [pressure(sequence).message for sequence in range(50)]
     assert Recording(out).report.truncated_at is None

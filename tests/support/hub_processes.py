@@ -95,7 +95,7 @@ def running(config: Path, identity: Identity, within: Sequence[str] = ()) -> Ite
             wait_until(lambda: bus.alive(identity.selector("health")), what="the hub's liveliness token")
             yield hub
             process.terminate()
-            assert process.wait(timeout=10) == 0
+            assert process.wait(timeout=30) == 0
         finally:
             bus.close()
             process.kill()

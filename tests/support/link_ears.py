@@ -15,9 +15,9 @@ class Ears:
         self.link = made(self._frames.append)
         self.link.start()
 
-    def get(self, timeout: float = 5.0) -> bytes:
+    def get(self) -> bytes:
         """The next frame."""
-        wait_until(self._looked, timeout, "a frame")
+        wait_until(self._looked, what="a frame")
         return self._frames.popleft()
 
     def empty(self) -> bool:

@@ -3,8 +3,12 @@
 import time
 from collections.abc import Callable
 
+PATIENCE_S = 45.0  # a condition that comes at all comes long before, on a busy machine too
 
-def wait_until(condition: Callable[[], object], timeout_s: float = 15.0, what: str = "condition") -> None:
+
+def wait_until(
+    condition: Callable[[], object], timeout_s: float = PATIENCE_S, what: str = "condition"
+) -> None:
     """Return as soon as ``condition()`` is true; AssertionError naming ``what`` if it never is."""
     deadline = time.monotonic() + timeout_s
     while not condition():

@@ -66,10 +66,13 @@ def play(exercise: "Exercise", how: Playing) -> Outcome:
 
 def prepare(scenario: str, seed: int, how: Playing) -> "Exercise":
     """The exercise of a scenario and a seed, built on the local processors; ConfigError if it is wrong."""
+    from proving_ground.exercises.capacity import check_memory
     from proving_ground.exercises.run_files import with_files, without_samples
-    from proving_ground.exercises.source import open_exercise
+    from proving_ground.exercises.source import open_exercise, soldier_count
     from proving_ground.exercises.storm import with_storm
 
+    if how.mode == "processes":
+        check_memory(soldier_count(scenario))
     with progress_bars() as show:
         exercise = open_exercise(
             scenario, seed, workers=how.local_workers, on_progress=lambda share: show("sensors", share)

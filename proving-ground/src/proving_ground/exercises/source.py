@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proving_ground.exercises.exercise import Exercise, FloatArray, Soldier
-from proving_ground.exercises.squad import NAME, simulated_squad
+from proving_ground.exercises.squad import NAME, SQUAD_SIZE, simulated_squad
 
 if TYPE_CHECKING:
     from proving_ground.scenario import Play, Scenario
@@ -50,6 +50,11 @@ def check_scenario(scenario: str) -> None:
     """ConfigError if there is no such scenario or something is wrong with it; nothing is built."""
     if scenario != NAME:
         _load(scenario)
+
+
+def soldier_count(scenario: str) -> int:
+    """How many soldiers take part; nothing is built."""
+    return SQUAD_SIZE if scenario == NAME else len(_load(scenario).cast.soldiers)
 
 
 @lru_cache(maxsize=1)
