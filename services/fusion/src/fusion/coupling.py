@@ -96,6 +96,7 @@ class Coupling:
             dual_foot.difference_jacobian(self._filter.state, passing),
             self._boots.same_position_sigma_m**2 * np.eye(3),
             gate_probability=self._boots.gate_probability,
+            relative=True,
         )
 
     def _abreast(self, passing: Passing, side: float, step: FootStep) -> Measurement:
@@ -109,6 +110,7 @@ class Coupling:
             noise * max(1.0, 2.0 * self._boots.passing_correlation),
             gate_noise=noise,
             gate_probability=self._boots.gate_probability,
+            relative=True,
         )
 
     def _abreast_noise(self, side: float, step: FootStep) -> Array:
@@ -125,6 +127,7 @@ class Coupling:
             np.array([excess]),
             dual_foot.separation_jacobian(self._filter.state, passing),
             np.array([[self._boots.separation_sigma_m**2]]),
+            relative=True,
         )
 
     def _judge(self, foot: Foot, other: Foot, innovation: Innovation) -> tuple[Verdict, Foot | None]:

@@ -344,8 +344,6 @@ class Estimator:
 
     def _covariance(self, alive: list[Foot]) -> Array:
         """Covariance (3, 3) of the body's position in the filter's frame, m²."""
-        jacobian = body.position_jacobian(
-            self.boots.filter.state, [(foot.block, foot.offset) for foot in alive]
-        )
-        spread: Array = jacobian @ self.boots.filter.covariance @ jacobian.T
+        known, stands = self.boots.filter, [(foot.block, foot.offset) for foot in alive]
+        spread = body.position_covariance(known.state, known.covariance, stands)
         return spread + self._config.boots.pose_sigma_m**2 * np.eye(3)

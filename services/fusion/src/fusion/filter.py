@@ -41,6 +41,9 @@ class Measurement:
     the measurement over, error and all, instead of a mean of both: what is left of its own error is independent of
     what was replaced, so nothing counts twice. (Covariance intersection along the measured directions, whose
     optimum between two scalars is the surer of them: Julier and Uhlmann 1997.)
+
+    ``relative``: of those who walk against each other only. It knows no north, so what it corrects is as much
+    turned as they are.
     """
 
     source: str
@@ -50,6 +53,7 @@ class Measurement:
     gate_noise: Array | None = None
     gate_probability: float | None = None
     entangled: bool = False
+    relative: bool = False
 
 
 def invert_spd(matrix: Array) -> Array:
@@ -151,7 +155,10 @@ class StateFilter:
         """Gate, then update; the innovation tells what happened."""
         innovation = self._innovation(measurement)
         if innovation.accepted:
+            before = self.state
             self._correct(measurement)
+            if measurement.relative:
+                self._turn_along(self.state - before)
             self._settle()
         return innovation
 
@@ -163,6 +170,20 @@ class StateFilter:
         kept = np.eye(self.layout.size) - gain @ jacobian
         self.state = self.state + gain @ measurement.residual
         self.covariance = kept @ self.covariance @ kept.T + gain @ noise @ gain.T
+
+    def _turn_along(self, moved: Array) -> None:
+        """What has been ``moved`` (n,) by how feet stand to each other is turned by as much as their yaw is.
+
+        The correction was found in their axes and is told in the map's. Without its share of the yaw's error the
+        next one would be compared with a geometry that is turned otherwise, and the filter would find itself ever
+        surer of a north that nobody has seen (Huang, Mourikis and Roumeliotis 2010; an invariant error has it built
+        in: Barrau and Bonnabel 2017).
+        """
+        turning = np.eye(self.layout.size)
+        for block in self.layout.walkers:
+            east, north, _ = moved[block.position]
+            turning[block.position, block.yaw] = (-north, east, 0.0)
+        self._advance(self.state, turning, np.zeros_like(self.covariance))
 
     def _innovation(self, measurement: Measurement) -> Innovation:
         noise = measurement.noise if measurement.gate_noise is None else measurement.gate_noise
