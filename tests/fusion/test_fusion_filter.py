@@ -1,5 +1,6 @@
 """The filter against the textbook's other form, its gate, and the two ways in which feet share errors."""
 
+import math
 import subprocess
 import sys
 
@@ -11,6 +12,8 @@ from bootprint.messages import FootStep, upper_triangle
 from fusion.chi_square import chi_square_quantile
 from fusion.config import FeetConfig
 from fusion.filter import Measurement, StateFilter, invert_spd
+from fusion.models import dual_foot
+from fusion.models.dual_foot import Passing
 from fusion.models.shared_errors import prior
 from fusion.state import Array, Layout
 from fusion.transform import RigidTransform
@@ -143,3 +146,33 @@ def test_moving_the_frame_keeps_distances_and_adds_a_common_error() -> None:
     # 5 m from the target: the yaw's error adds (3 m)² east and (4 m)² north of 0.01 rad²
     np.testing.assert_allclose(variances[RIGHT.all], [4.09, 4.16, 1.0, 0.01], atol=1e-12)
     assert state_filter.covariance[LEFT.start, RIGHT.start] == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("relative", [True, False])
+def test_feet_that_hold_each_other_do_not_learn_where_north_is(relative: bool) -> None:
+    """Two feet whose heading is known to 20 degrees pass each other three hundred times.
+
+    Nothing of that tells what turns both. Told that the measurements are relative, the filter knows; else the
+    corrections, each linearised elsewhere, add up to a heading that it believes in.
+    """
+    rng, size = np.random.default_rng(9), LAYOUT.size
+    common, own, sigmas = math.radians(20.0), 0.05, np.array([0.02, 0.02, 0.02, 0.05])
+    covariance = np.zeros((size, size))
+    for one in LAYOUT.blocks:
+        for other in LAYOUT.blocks:
+            covariance[one.yaw, other.yaw] = common**2 + (own**2 if one is other else 0.0)
+    state = np.zeros(size)
+    state[LAYOUT.width], state[LEFT.start + 1], state[RIGHT.start] = 0.2, 0.2, 0.7
+    walked = StateFilter(LAYOUT, (state, covariance))
+    for number in range(300):
+        stepped, standing, side = (RIGHT, LEFT, 1.0) if number % 2 else (LEFT, RIGHT, -1.0)
+        forward, left, up, turn = sigmas * rng.normal(size=4) + (1.4, 0.0, 0.0, 0.0)
+        walked.propagate(stepped, step((forward, left, up), turn), np.diag(sigmas**2))
+        passing = Passing(standing, stepped, (forward, left, up), turn)
+        residual = 0.05 * rng.normal(size=3) - dual_foot.abreast(walked.state, passing, side, LAYOUT.width)
+        jacobian = dual_foot.abreast_jacobian(walked.state, passing, side, LAYOUT.width)
+        noise = 0.05**2 * np.eye(3)
+        walked.update(Measurement("dual_foot", residual, jacobian, noise, relative=relative))
+    mean = np.zeros(size)
+    mean[[LEFT.yaw, RIGHT.yaw]] = 0.5
+    assert (math.sqrt(float(mean @ walked.covariance @ mean)) > common) == relative

@@ -154,5 +154,31 @@ def test_correlated_fixes_carry_the_information_of_few() -> None:
     tau_s, step_s, count = 30.0, 1.0, 2000
     lags = np.abs(np.subtract.outer(np.arange(count), np.arange(count))) * step_s
     variance_of_mean = float(np.exp(-lags / tau_s).mean())
-    assert gnss.correlation_inflation(step_s, tau_s) / count == pytest.approx(variance_of_mean, rel=0.03)
-    assert gnss.correlation_inflation(100.0, tau_s) == 1.0
+    walking = gnss.correlation_inflation(step_s, 1.4, GnssConfig(correlation_s=tau_s))
+    assert walking / count == pytest.approx(variance_of_mean, rel=0.03)
+    assert gnss.correlation_inflation(100.0, 140.0, GnssConfig(correlation_s=tau_s)) == 1.0
+    assert gnss.correlation_inflation(math.inf, math.inf, GnssConfig()) == 1.0
+
+
+def test_fixes_of_who_stands_tell_hardly_anything_new() -> None:
+    """Five minutes of standing are worth half a fix, and so are six metres of creeping, however slow."""
+    config = GnssConfig(standing_correlation_s=300.0, reflection_m=6.0)
+    assert 300.0 / gnss.correlation_inflation(1.0, 0.0, config) == pytest.approx(0.5)
+    creeping = [gnss.correlation_inflation(1.0, 0.05, config) for _ in range(120)]
+    assert sum(1.0 / one for one in creeping) == pytest.approx(0.5 + 0.5 * 120 / 300)
+
+
+def test_a_heading_that_is_hardly_known_leaves_the_place_on_an_arc() -> None:
+    """A way of 100 m to the east whose heading is good to 20 degrees: mean squares of many draws."""
+    layout = Layout.of(("left_foot",))
+    block, sigma, way_m = layout.blocks[0], math.radians(20.0), 100.0
+    covariance = np.zeros((layout.size, layout.size))
+    response = np.zeros(layout.size)
+    response[block.start + 1], response[block.yaw] = way_m, 1.0  # north of the place, and the yaw
+    covariance += sigma**2 * np.outer(response, response)
+    stands: list[body.Stand] = [(block, (0.0, 0.0, 0.0))]
+    told = body.position_covariance(np.zeros(layout.size), covariance, stands)
+    turns = np.random.default_rng(3).normal(0.0, sigma, 200_000)
+    assert told[0, 0] == pytest.approx(np.mean((way_m * (np.cos(turns) - 1.0)) ** 2), rel=0.02)
+    assert told[1, 1] == pytest.approx(np.mean((way_m * np.sin(turns)) ** 2), rel=0.02)
+    assert not body.position_covariance(np.zeros(layout.size), np.zeros_like(covariance), stands).any()

@@ -2,12 +2,14 @@
 
 import ast
 import re
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from bootprint.commands.topics import topics_markdown
+from support.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parents[2]
 ROOMS = {
@@ -98,3 +100,8 @@ def test_links_between_documents_lead_somewhere(document: Path) -> None:
 
 def test_the_topics_page_is_the_table() -> None:
     assert (ROOT / "docs/topics.md").read_text(encoding="utf-8") == topics_markdown()
+
+
+def test_two_waits_in_a_row_end_with_what_was_waited_for_rather_than_with_a_dump() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert settings["tool"]["pytest"]["ini_options"]["timeout"] > 2.0 * PATIENCE_S

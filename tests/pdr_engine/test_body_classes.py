@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bootprint.messages import Direction
 from pdr_engine.body.movement.classes import Climb, MovementClassifier
 from pdr_engine.body.movement.direction import DirectionFilter
 from pdr_engine.body.movement.posture import Posture
@@ -143,29 +144,39 @@ def test_corrections_are_those_of_the_source() -> None:
     assert math.degrees(SideStepRotation(1.0).rotation_rad) == pytest.approx(20.0)
 
 
+def walk_on(
+    rotation: SideStepRotation, ways: list[tuple[Direction, float, int]], drift_deg_s: float = 0.0
+) -> None:
+    """Stretches of (direction, where the body faces in degrees, steps), half a second a step; the gyro drifts."""
+    at_s = 0.0
+    for direction, facing_deg, steps in ways:
+        for _ in range(steps):
+            rotation.update(direction, math.radians(facing_deg + drift_deg_s * at_s), at_s)
+            at_s += 0.5
+
+
 def test_the_rotation_is_learned_where_side_steps_begin_and_end() -> None:
     rotation = SideStepRotation()
     assert rotation.rotation_rad == USUAL_ROTATION_RAD
-    turn = math.radians(13.0)
     # Forward, left (the body turns left, the heading grows), forward again; a change is seen a step late.
-    for heading in [0.0] * 9 + [turn]:
-        rotation.update("forward", heading)
-    for heading in [turn] * 9 + [0.0]:
-        rotation.update("left", heading)
-    assert rotation.rotation_rad == pytest.approx(turn)
-    for heading in [0.0] * 9:
-        rotation.update("forward", heading)
-    assert (rotation.observations, rotation.rotation_rad) == (2, pytest.approx(turn))
-    for heading in [-turn] * 9:
-        rotation.update("right", heading)
-    assert (rotation.observations, rotation.rotation_rad) == (3, pytest.approx(turn))
+    walk_on(rotation, [("forward", 0.0, 12), ("forward", 13.0, 1), ("left", 13.0, 30), ("left", 0.0, 1)])
+    assert math.degrees(rotation.rotation_rad) == pytest.approx(13.0, abs=0.8)
+    walk_on(rotation, [("forward", 0.0, 12), ("right", -13.0, 12)])
+    assert (rotation.observations, math.degrees(rotation.rotation_rad)) == (3, pytest.approx(13.0, abs=0.4))
+
+
+def test_a_gyro_s_drift_is_no_rotation() -> None:
+    """0.4°/s would show as 2 to 5° of rotation, and a halt that looks like two steps forward hides no change."""
+    rotation = SideStepRotation()
+    ways: list[tuple[Direction, float, int]] = [("left", 8.0, 30), ("forward", 4.0, 2), ("backward", 0.0, 30)]
+    walk_on(rotation, [("forward", 0.0, 20), *ways, ("right", -8.0, 30)], drift_deg_s=0.4)
+    assert rotation.observations == 3
+    assert math.degrees(rotation.rotation_rad) == pytest.approx(8.0, abs=1.0)
 
 
 def test_a_real_turn_teaches_no_rotation() -> None:
     rotation = SideStepRotation()
-    for direction, heading in (("forward", 0.0), ("left", 1.5)):
-        for _ in range(9):
-            rotation.update(direction, heading)
+    walk_on(rotation, [("forward", 0.0, 9), ("left", 86.0, 9)])
     assert rotation.observations == 0
 
 

@@ -5,12 +5,16 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Route, expect
 
+from bootprint.display import shown
 from bootprint.geodesy import ground_offset
+from bootprint.messages import Observation, Track
+from bootprint.topics import SUBJECT_OF
 from proving_ground.exercises.exercise import Exercise
 from proving_ground.exercises.line import Line
 from proving_ground.exercises.shown_play import Pace, ShownPlay, walked_exercise
@@ -21,12 +25,18 @@ from support.browser import CAN_RUN, WHY_NOT, Tab, running_chromium, tab
 from support.tiles import EXTENT, vector_tile, write_mbtiles, write_pmtiles
 from support.waiting import wait_until
 
-pytestmark = [pytest.mark.processes, pytest.mark.skipif(not CAN_RUN, reason=WHY_NOT)]
+pytestmark = [
+    pytest.mark.processes,
+    pytest.mark.xdist_group("page"),  # one squad and one browser for all
+    pytest.mark.timeout(400),
+    pytest.mark.skipif(not CAN_RUN, reason=WHY_NOT),
+]
 expect.set_options(timeout=90_000)  # a page whose map is drawn in software on a busy machine takes its time
+Said = TypeVar("Said", Observation, Track)
 Walked = tuple[Exercise, dict[str, Line]]
 SILENT = "a3"
 BEGIN_S = 45.0
-"""Event seconds into the exercise at which somebody looks: one soldier is lost by then."""
+"""Event seconds into the exercise at which somebody looks: one is lost by then, others walk for minutes more."""
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +50,7 @@ def walked() -> Walked:
 def squad(walked: Walked, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ShownPlay]:
     folder = tmp_path_factory.mktemp("page")
     archive = Archive(f"sqlite:///{folder / 'history.db'}")
-    with ShownPlay(*walked, folder, Pace(2.0, BEGIN_S), archive=archive) as play:
+    with ShownPlay(*walked, folder, Pace(1.0, BEGIN_S), archive=archive) as play:
         wait_until(lambda: play.elapsed_s >= BEGIN_S, timeout_s=240.0, what="the squad's way until then")
         yield play
     archive.close()
@@ -69,17 +79,19 @@ def test_soldiers_move_on_the_map(looking: Tab) -> None:
 
 
 def test_symbols_stand_where_the_map_has_their_places(looking: Tab) -> None:
-    apart = looking.says(
-        """[...squad.map.overlay.drawn.values()].map(each => {
-        const place = squad.map.map.project(each.mark.place);
-        return Math.hypot(place.x - each.at[0], place.y - each.at[1]); })"""
+    # Waited for: the map may have been moved since the last drawing.
+    looking.wait(
+        """(apart => apart.length >= 7 && Math.max(...apart) < 0.5)
+        ([...squad.map.overlay.drawn.values()].map(({ mark, at }) => (place =>
+        Math.hypot(place.x - at[0], place.y - at[1]))(squad.map.map.project(mark.place))))"""
     )
-    assert len(apart) >= 7, "everybody but the lost one is in view"
-    assert max(apart) < 0.5
     inked = looking.says(
-        """[...squad.map.overlay.drawn.values()].map(each => squad.map.overlay.canvas.getContext("2d")
-        .getImageData(each.at[0] * devicePixelRatio, each.at[1] * devicePixelRatio, 1, 1).data[3])"""
+        """(({ canvas, drawn }) => [...drawn.values()].map(each => each.at)
+        .filter(([x, y]) => x > 0 && y > 0 && x < canvas.clientWidth && y < canvas.clientHeight)
+        .map(([x, y]) => canvas.getContext("2d")
+        .getImageData(x * devicePixelRatio, y * devicePixelRatio, 1, 1).data[3]))(squad.map.overlay)"""
     )
+    assert len(inked) >= 7, "everybody but the lost one is in view"
     assert min(inked) > 100
 
 
@@ -130,7 +142,7 @@ def test_an_alert_stays_until_somebody_acknowledges_it(looking: Tab, squad: Show
     page.select_option('dialog [name="kind"]', "withdraw")
     page.fill('dialog [name="text"]', "by the stairs")
     page.click("dialog .primary")
-    banner = page.locator(".alert")
+    banner = page.locator(".alert[data-alert]")
     expect(banner).to_contain_text("WITHDRAW")
     expect(banner).to_contain_text("by the stairs")
     assert page.locator("#map").bounding_box() == where, "nothing moves under anybody's finger"
@@ -138,6 +150,21 @@ def test_an_alert_stays_until_somebody_acknowledges_it(looking: Tab, squad: Show
     expect(banner).to_have_count(0)
     (alert,) = squad.desk.picture.all("alerts").values()
     assert getattr(alert, "acknowledged_by", None) == "local"
+    page.click("#side-toggle")  # at this size the side is closed until it is wanted
+    page.click('[data-tab="seen"]')
+    expect(page.locator("#right .row.alerted")).to_contain_text("by the stairs · from Zero · seen by local")
+    page.click("#side-toggle")
+
+
+def test_what_a_finger_is_on_stays_while_figures_change(looking: Tab) -> None:
+    page = looking.page
+    page.click('.row[data-soldier="a1"]')
+    button = page.locator("#card .buttons button").first.element_handle()
+    before = looking.says("document.querySelector('#card dl').textContent")
+    looking.wait(f"document.querySelector('#card dl').textContent !== {before!r}")
+    assert button is not None
+    assert button.evaluate("each => each.isConnected"), "a click that begins on it ends on it"
+    page.click("#card .close")
 
 
 def test_an_observation_lies_where_it_was_clicked(looking: Tab, squad: ShownPlay) -> None:
@@ -156,10 +183,75 @@ def test_an_observation_lies_where_it_was_clicked(looking: Tab, squad: ShownPlay
     (seen,) = squad.desk.picture.all("observations").values()
     told = getattr(seen, "latitude_deg", 0.0), getattr(seen, "longitude_deg", 0.0)
     assert ground_offset(tuple(place), told) == pytest.approx((0.0, 0.0), abs=0.3)
-    page.click("#side-toggle")  # on a tablet the side is closed until it is wanted
+    page.click("#side-toggle")
     page.click('[data-tab="seen"]')
     expect(page.locator("#right .body")).to_contain_text("two trucks")
     page.click("#side-toggle")
+
+
+def test_what_a_soldier_sees_is_placed_by_bearing_and_range(looking: Tab, squad: ShownPlay) -> None:
+    page, before = looking.page, len(squad.desk.picture.all("observations"))
+    page.click('.row[data-soldier="a2"]')
+    page.keyboard.press("b")
+    page.locator("#map").click(position={"x": 260, "y": 330})
+    page.fill('dialog [name="azimuth_deg"]', "90")
+    page.fill('dialog [name="range_m"]', "200")
+    page.fill('dialog [name="text"]', "by the fence")
+    page.click("dialog .primary")
+    looking.wait(f"squad.state.observations.size === {before + 1}")
+    seen = next(each for each in archived(squad, Observation) if each.text == "by the fence")
+    at = place_of(squad, "a2", seen.time_ns)
+    from_m = ground_offset(at, (seen.latitude_deg, seen.longitude_deg))
+    assert from_m == pytest.approx((200.0, 0.0), abs=2.0)  # their word may have come after the order
+    page.click("#card .close")
+
+
+def archived(squad: ShownPlay, kind: type[Said]) -> list[Said]:
+    """The messages of a kind that the post keeps, in the order of their time."""
+    assert squad.desk.archive is not None
+    kept = squad.desk.archive.messages(SUBJECT_OF[kind], 0, 2**62)
+    return [each.message for each in kept if isinstance(each.message, kind)]
+
+
+def place_of(squad: ShownPlay, soldier: str, time_ns: int) -> tuple[float, float]:
+    """Where the post showed somebody at that time."""
+    tracks = (each for each in archived(squad, Track) if each.soldier == soldier and each.time_ns <= time_ns)
+    then = shown(max(tracks, key=lambda track: track.time_ns), time_ns, squad.desk.post.ages)
+    return then.latitude_deg, then.longitude_deg
+
+
+def test_measuring_tells_metres_degrees_and_mils(looking: Tab) -> None:
+    page = looking.page
+    page.keyboard.press("m")
+    page.locator("#map").click(position={"x": 260, "y": 330})
+    page.locator("#map").hover(position={"x": 360, "y": 330})
+    text = looking.wait("squad.map.draft.places.length === 2 && squad.map.draft.text")
+    metres, azimuth, mils = re.fullmatch(r"([\d.]+) m · ([\d.]+)° · (\d+) mil", text).groups()  # type: ignore[union-attr]
+    per_metre = looking.says("squad.map.overlay.view.pixelsPerMetre(squad.map.map.getCenter().lat)")
+    assert float(metres) == pytest.approx(100.0 / per_metre, rel=0.01)
+    assert (float(azimuth), float(mils)) == pytest.approx((90.0, 1600.0), rel=0.01)
+    page.click("#hint button")
+    expect(page.locator("#hint")).to_be_empty()
+
+
+def test_who_is_followed_stays_in_the_middle(looking: Tab) -> None:
+    page = looking.page
+    mover = looking.wait(
+        "squad.state.seen().find(each => Math.hypot(each.track.east_velocity_m_s,"
+        " each.track.north_velocity_m_s) > 0.4)?.track.soldier"
+    )
+    page.click(f'.row[data-soldier="{mover}"]')
+    page.keyboard.press("g")
+    looking.says("void (squad.from = squad.map.map.getCenter())")
+    looking.wait(
+        f"""(at => at && squad.map.map.getCenter().distanceTo(squad.from) > 0.5
+        && Math.hypot(at[0] - squad.map.map.getContainer().clientWidth / 2,
+        at[1] - squad.map.map.getContainer().clientHeight / 2) < 20)
+        (squad.map.overlay.drawn.get("{mover}")?.at)"""
+    )
+    page.keyboard.press("g")
+    page.click("#card .close")
+    page.keyboard.press("f")
 
 
 def test_looking_back_shows_the_picture_of_then(looking: Tab) -> None:
@@ -175,8 +267,31 @@ def test_looking_back_shows_the_picture_of_then(looking: Tab) -> None:
     expect(page.locator("#line")).to_have_text("looking back")
     newest = looking.says("Math.max(...squad.state.seen().map(each => each.track.time_s))")
     assert moment_s - 15.0 < newest <= moment_s
+    looking.wait("squad.state.trail('a1').length > 1")
+    assert looking.says("squad.state.trail('a1').every(each => each.time_s <= squad.state.past.time_s)")
     page.click("#play")
     looking.wait(f"squad.state.past?.time_s > {moment_s} + 1")
+    page.keyboard.press("Home")
+    expect(page.locator("#line")).to_have_text("live")
+
+
+def test_playing_stops_when_the_hub_is_out_of_reach_and_says_so_once(looking: Tab) -> None:
+    page = looking.page
+    asked: list[str] = []
+
+    def lose(route: Route) -> None:
+        asked.append(route.request.url)
+        route.abort()
+
+    looking.wait("Number(document.querySelector('#seek').max) > 1e9")
+    page.keyboard.press("Space")
+    looking.wait("squad.state.past?.playing")
+    page.route("**/history/picture*", lose)
+    looking.wait("squad.state.past?.playing === false")
+    expect(page.locator("#toast")).to_have_text("the hub cannot be reached")
+    page.wait_for_timeout(1000)  # five beats
+    assert len(asked) == 1
+    page.unroute("**/history/picture*")
     page.keyboard.press("Home")
     expect(page.locator("#line")).to_have_text("live")
 
@@ -201,13 +316,13 @@ def pixels() -> bytes:
 WORLD = ((0, 0), (EXTENT, 0), (EXTENT, EXTENT), (0, EXTENT))
 
 
-def test_a_basemap_of_ones_own_lies_below_the_grid(chromium: Browser, walked: Walked, tmp_path: Path) -> None:
+def test_a_basemap_of_ones_own_lies_below_the_plan(chromium: Browser, walked: Walked, tmp_path: Path) -> None:
     write_pmtiles(tmp_path / "area.pmtiles", pixels())
     settings = PageSettings(port=0, basemap="area.pmtiles")
     with ShownPlay(*walked, tmp_path, settings=settings) as play, tab(chromium, play.address) as looking:
         looking.wait('squad.map.map.getSource("basemap") && squad.map.map.isSourceLoaded("basemap")')
         order = looking.says("squad.map.map.getStyle().layers.map(each => each.id)")
-        assert order.index("ground") < order.index("basemap") < order.index("grid")
+        assert order.index("ground") < order.index("basemap") < order.index("outdoor")
         assert looking.faults == []
 
 

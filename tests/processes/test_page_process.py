@@ -32,7 +32,7 @@ def page_port() -> int:
 
 def ask(url: str, context: ssl.SSLContext | None = None, **headers: str) -> Any:
     request = urllib.request.Request(url, headers=headers)
-    with urllib.request.urlopen(request, timeout=10.0, context=context) as answer:
+    with urllib.request.urlopen(request, timeout=30.0, context=context) as answer:
         return json.load(answer)
 
 
@@ -50,6 +50,43 @@ def test_page_of_a_hub_tells_of_its_health_and_is_told_of_in_it(tmp_path: Path) 
         wait_until(lambda: hub.health, what="the hub's health")
         assert hub.health[-1].counters["page_dropped"] == 0
         wait_until(lambda: ask(f"{root}/history")["end_s"], what="history")
+
+
+def test_page_of_a_hub_that_was_started_again_shows_the_alerts_of_before(tmp_path: Path) -> None:
+    write_realm(tmp_path)
+    port = page_port()
+    page = f'role = "command_post"\n[hub.history]\n[hub.page]\nport = {port}'
+    config = write_computer(tmp_path, "cp", page, LINK)
+    root = f"http://127.0.0.1:{port}/api/v1"
+    with running(config, CP):
+        seen = order(f"{root}/alerts", {"kind": "fire"})
+        order(f"{root}/alerts", {"kind": "help"})
+        order(f"{root}/alerts/{seen['id']}/acknowledgement", {})
+    with running(config, CP):
+        alerts = ask(f"{root}/picture")["alerts"].values()
+    assert {each["kind"]: each["acknowledged_by"] for each in alerts} == {"fire": "local", "help": None}
+
+
+def order(url: str, asked: dict[str, str]) -> Any:
+    """Post it as the page does, as soon as there are a page and what it is about."""
+    answers: list[Any] = []
+
+    def is_answered() -> bool:
+        request = urllib.request.Request(
+            url, json.dumps(asked).encode(), {"content-type": "application/json"}
+        )
+        try:
+            with urllib.request.urlopen(request, timeout=30.0) as answer:
+                answers.append(json.load(answer))
+        except urllib.error.HTTPError as refused:
+            refused.close()
+            return False
+        except urllib.error.URLError:
+            return False
+        return True
+
+    wait_until(is_answered, what=url)
+    return answers[-1]
 
 
 def test_page_for_others_takes_tls_and_a_token(tmp_path: Path) -> None:

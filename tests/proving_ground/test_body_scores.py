@@ -4,7 +4,8 @@ import numpy as np
 
 from proving_ground.evaluation.body_azimuth import simulated
 from proving_ground.evaluation.body_heights import run_building, told_pct
-from proving_ground.evaluation.body_pns_gps import town
+from proving_ground.evaluation.body_pns_gps import chain_steps, drawn_steps, town
+from proving_ground.people import Itinerary, Leg, Person, move
 
 
 def test_a_building_s_heights_and_floors_through_the_whole_chain() -> None:
@@ -28,6 +29,21 @@ def test_a_bridge_has_a_third_of_the_compass_s_error_past_iron() -> None:
 
 
 def test_gps_in_three_sections_is_enough() -> None:
-    score = town(seed=104)
+    score = town(104, drawn_steps)
     assert score.worst_m < 20.0
     assert score.dead_reckoning_m > 2.0 * score.worst_m
+
+
+def test_the_chain_s_steps_lead_along_the_streets() -> None:
+    streets_m = np.array([[0.0, 0.0, 0.0], [70.0, 0.0, 0.0], [70.0, 50.0, 0.0]])
+    motion = move(Person(), Itinerary((Leg("walk", streets_m),), start_s=5.0), 1)
+    steps = chain_steps(motion, streets_m, np.random.default_rng(1))
+    assert len(steps.times_s) == len(steps.truth_m) == len(steps.lengths_m) + 1 == len(steps.azimuths) + 1
+    told, true = steps.lengths_m, np.linalg.norm(np.diff(steps.truth_m, axis=0), axis=1)
+    assert (
+        0.75 < told.sum() / true.sum() < 1.1
+    )  # until a hundred steps tell trunk from hand they are too short
+    first, second = np.degrees(steps.azimuths[10:70]), np.degrees(steps.azimuths[-40:-5])
+    assert abs(np.median(first) % 360.0 - 90.0) < 12.0  # magnetometer and seat are not perfect
+    assert abs((np.median(second) + 180.0) % 360.0 - 180.0) < 12.0
+    np.testing.assert_allclose(steps.truth_m[-1], streets_m[-1, :2], atol=3.0)

@@ -63,7 +63,7 @@ function readPayload(payload) {
 
 function open(frame, epoch, counter) {
   const clear = frame[1] & 8 ? 8 : 2, header = readFields(new Bits(frame.subarray(0, clear)), layout.header, {});
-  if (header.version !== 2) throw new Error("version");
+  if (header.version !== 3) throw new Error("version");
   const info = `bootprint radio 2|${vectors.tag_bytes}|${header.sender}|${vectors.net}`;
   const groupKey = Buffer.from(vectors.group_key, "hex");
   const key = Buffer.from(crypto.hkdfSync("sha256", groupKey, Buffer.alloc(0), info, 32));

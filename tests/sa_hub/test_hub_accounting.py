@@ -1,11 +1,13 @@
 """What hubs tell of their nets by soldier: ages, expected errors, who is sure to know whom, whose place matters."""
 
+import numpy as np
 import pytest
 
 from bootprint.awareness import Contacts
 from bootprint.bus import Envelope
-from bootprint.messages import LinkReport, Observation, ObservationCode, Position
-from support.hub_squad import ORIGIN, START_NS, Air, S, Walk, distance_m, hub, link, own_identity, position
+from bootprint.messages import LinkReport, Observation, ObservationCode
+from sa_hub.radio.relevance import NEAR_SEEN
+from support.hub_squad import ORIGIN, START_NS, Air, S, Walk, distance_m, hub, link, own_identity
 
 SQUAD = link("squad", 300, header_bytes=0)
 STANDING = Walk(speed_m_s=0.0)
@@ -55,13 +57,12 @@ def test_who_gives_feedback_is_known_to_know_others() -> None:
     assert "lead" in known["a2"]
 
 
-def test_who_is_near_a_danger_is_told_of_more_closely_than_who_is_near_a_rally_point() -> None:
-    assert near_to_far("sniper") < 0.97 * near_to_far("rally_point")
-
-
-def near_to_far(code: ObservationCode) -> float:
-    """A leader tells of two who walk, one where something was seen: the ratio of their expected errors."""
-    core = hub("lead", link("squad", 25, header_bytes=0), role="squad_leader")
+@pytest.mark.parametrize(("code", "factor"), [("sniper", NEAR_SEEN), ("rally_point", 1.0)])
+def test_who_is_near_a_danger_matters_more_than_who_is_near_a_rally_point(
+    code: ObservationCode, factor: float
+) -> None:
+    """On every net of a hub that hears of it; what the factor does to who is told is the scheduler's."""
+    core = hub("lead", link("squad", 25, header_bytes=0), link("company"), role="squad_leader")
     seen = Observation(
         time_ns=START_NS,
         soldier="lead",
@@ -73,19 +74,8 @@ def near_to_far(code: ObservationCode) -> float:
     )
     core.tick(START_NS)
     core.handle(Envelope(own_identity("lead").address("observation", "people"), seen))
-    sums = {"a1": 0.0, "a2": 0.0}
-    for step in range(4000):
-        now_ns = START_NS + step * S // 10
-        for number, walk in (
-            (1, Walk(turn_deg=130.0)),
-            (2, Walk(east_m=2000.0, turn_deg=-110.0, speed_m_s=1.7)),
-        ):
-            message = position(f"a{number}", now_ns, walk).message
-            assert isinstance(message, Position)
-            core.take_in(message, number)
-        for envelope in core.tick(now_ns):
-            if isinstance(envelope.message, LinkReport) and step > 600:
-                for name in sums:
-                    sums[name] += envelope.message.expected_errors_m[name] or 0.0
-        core.take_frames()
-    return sums["a1"] / sums["a2"]
+    latitude = ORIGIN.latitude_deg + np.array([100.0, 2000.0]) / 111_133.0
+    longitude = np.full(2, ORIGIN.longitude_deg)
+    for net in core._nets.values():
+        weights = net.scheduler.relevance.weights([1, 2], latitude, longitude, START_NS + S)
+        assert weights.tolist() == [factor, 1.0]

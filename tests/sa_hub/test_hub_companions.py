@@ -1,5 +1,6 @@
 """What accompanies a hub: the worker that runs it, and a real command post with all of it."""
 
+import queue
 import socket
 import subprocess
 import sys
@@ -20,7 +21,7 @@ from bootprint.errors import ConfigError
 from bootprint.foreign import ForeignTrack
 from bootprint.messages import Alert, Message, Observation, Position
 from bootprint.service import Context, Options
-from sa_hub.companions.worker import Worker
+from sa_hub.companions.worker import Promise, Worker
 from sa_hub.history.archive import Archive
 from sa_hub.main import build
 from sa_hub.tak.event import CotEvent, from_xml, to_xml
@@ -119,6 +120,88 @@ def test_a_bug_in_a_sink_is_told_and_survived() -> None:
     worker.start()
     wait_until(lambda: worker.figures().counters["sink_faults"] == 1, what="the fault")
     assert worker.figures().note == "sink: a fault of the program, see the log"
+    worker.close()
+
+
+def test_a_promise_is_kept_when_all_that_was_entrusted_is_and_not_before() -> None:
+    sink = Sink(keeps=True)
+    sink.may_go.clear()
+    worker = Worker(sink)
+    worker.start()
+    fate = worker.entrust(alerts(1, 2))
+    assert worker.entrust(alerts(-1))() == "kept", "the sink does not want it"
+    assert fate() == "waiting"
+    sink.may_go.set()
+    wait_until(lambda: fate() == "kept", what="the promise")
+    assert sink.taken == [1, 2]
+    worker.close()
+
+
+def test_what_fails_finds_no_room_or_is_given_up_is_not_kept() -> None:
+    sink = Sink(keeps=True, failures=1)
+    worker = Worker(sink, capacity=2)
+    worker.start()
+    failing = worker.entrust(alerts(1))
+    wait_until(lambda: failing() != "waiting", what="the fault")
+    assert failing() == "unkept"
+    assert worker.entrust(alerts(2, 3, 4))() == "unkept", "one found the queue full"
+    wait_until(lambda: failing() == "kept", what="the next attempt")
+    wait_until(lambda: sink.taken[:3] == [1, 2, 3], what="what had room")
+    sink.failures = "many"  # type: ignore[assignment]
+    broken = worker.entrust(alerts(5))
+    wait_until(lambda: worker.figures().counters["sink_faults"] == 2, what="the fault of the program")
+    sink.failures = 0
+    after = worker.entrust(alerts(6))
+    wait_until(lambda: after() == "kept", what="the one after it")
+    assert broken() == "unkept"
+    worker.close()
+
+
+def test_who_keeps_nothing_need_not_be_waited_for() -> None:
+    worker = Worker(Sink(keeps=False), capacity=1)
+    assert worker.entrust(alerts(1, 2))() == "kept"
+
+
+def test_a_promise_to_one_is_not_kept_by_what_another_tells(monkeypatch: pytest.MonkeyPatch) -> None:
+    laid, go_on = threading.Event(), threading.Event()
+
+    class Gate(queue.Queue[Envelope]):
+        """Whoever lays the first envelope stands still behind it."""
+
+        def put_nowait(self, item: Envelope) -> None:
+            super().put_nowait(item)
+            if not laid.is_set():
+                laid.set()
+                go_on.wait()
+
+    class OneByOne(Sink):
+        most, begun, turns = 1, 0, threading.Semaphore(0)
+
+        def take(self, envelopes: list[Envelope]) -> None:
+            if envelopes:
+                self.begun += 1
+                self.turns.acquire()
+
+    monkeypatch.setattr(queue, "Queue", Gate)
+    sink = OneByOne(keeps=True)
+    worker = Worker(sink)
+    monkeypatch.undo()
+    promises: list[Promise] = []
+    other = threading.Thread(target=lambda: worker.tell(alerts(1)))
+    teller = threading.Thread(target=lambda: promises.append(worker.entrust(alerts(2))))
+    other.start()
+    laid.wait()
+    teller.start()
+    teller.join(0.3)  # it may have to wait for the other
+    go_on.set()
+    for thread in (other, teller):
+        thread.join()
+    worker.start()
+    sink.turns.release()
+    wait_until(lambda: sink.begun == 2, what="the second one's turn")
+    assert promises[0]() == "waiting", "only the other's is kept"
+    sink.turns.release()
+    wait_until(lambda: promises[0]() == "kept", what="the promise")
     worker.close()
 
 

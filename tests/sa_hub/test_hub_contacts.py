@@ -54,6 +54,17 @@ def test_a_soldier_proves_to_know_itself_and_what_it_says_to_have_heard_of_us() 
     assert set(contacts.knows) == {"a2", "a3"}
 
 
+def test_in_a_quiet_net_it_goes_on_proving_that() -> None:
+    air = company()
+    air.run(100.0, WALKS)
+    seen = len(air.outputs)
+    air.run(60.0, WALKS)
+    told = [e.message for name, e in air.outputs[seen:] if name == "a1" and isinstance(e.message, Contacts)]
+    assert len(told) == 12
+    for contacts in told:
+        assert {each.soldier for each in contacts.members if "a1" in each.knows} >= {"a2", "a3"}
+
+
 def test_the_map_is_told_every_five_seconds_under_one_key() -> None:
     air = company()
     air.run(60.0, WALKS)

@@ -442,7 +442,7 @@ def test_a_hub_with_no_counters_left_is_silent_and_says_so() -> None:
 
 def test_garbage_from_the_air_is_counted() -> None:
     core = hub("a1", SQUAD)
-    for data in (b"", b"\x00", b"\x80" + bytes(30), bytes(range(256))):
+    for data in (b"", b"\x00", b"\xc0" + bytes(30), bytes(range(256))):
         assert core.receive("squad", data, START_NS) == []
     assert sum(core.figures().counters.values()) == 4
 

@@ -204,7 +204,8 @@ def part_of(folder: Path, link_lines: str) -> tuple[HubPart, list[int]]:
     """A real hub's inside, and the list whose first number is its computer's clock, ns."""
     write_realm(folder)
     config = write_computer(folder, "a1", "threshold_m = 0.5\nheartbeat_s = 1.0", link_lines)
-    context = Context("sa-hub", load_computer(config), Options(config))
+    options = Options(config, speed="max")  # then it waits for its epoch's second before it starts, not after
+    context = Context("sa-hub", load_computer(config), options)
     host_ns = [START_NS]
     context.clock = ScaledClock(1.0, START_NS, host=lambda: host_ns[0])
     return build(context), host_ns

@@ -14,6 +14,7 @@ from starlette.websockets import WebSocketDisconnect
 from bootprint.geodesy import ground_offset
 from bootprint.messages import Alert, Fix, Observation
 from sa_hub.history.archive import Archive
+from sa_hub.page import past
 from sa_hub.page.access import new_token
 from sa_hub.page.app import MOST_BYTES
 from sa_hub.page.openapi import openapi
@@ -216,16 +217,31 @@ def test_the_past_is_the_picture_as_it_was(tmp_path: Path) -> None:
     moment_s = then_ns / S
     with browser(air) as client:
         client.post(f"{API}/alerts", json={"kind": "help"})
-        past = client.get(f"{API}/history/picture", params={"time_s": moment_s}).json()
+        then_told = client.get(f"{API}/history/picture", params={"time_s": moment_s}).json()
         span = client.get(f"{API}/history").json()
         whole = {"begin_s": span["begin_s"], "end_s": span["end_s"] + 1.0}
         trails = client.get(f"{API}/history/trails.geojson", params=whole).json()
         backwards = client.get(f"{API}/history/trails.geojson", params={"begin_s": 9.0, "end_s": 1.0})
-    assert past["tracks"]["a1"]["time_s"] == pytest.approx(then.time_ns / S, abs=1e-6)
+    assert then_told["tracks"]["a1"]["time_s"] == pytest.approx(then.time_ns / S, abs=1e-6)
     assert span["begin_s"] == pytest.approx(START_NS / S, abs=2.0)
     (trail,) = trails["features"]
     assert len(trail["properties"]["times_s"]) == len(trail["geometry"]["coordinates"]) > 2
     assert backwards.status_code == 422
+
+
+def test_trails_that_are_too_long_for_an_answer_say_where_they_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    air = walked(PostAir(tmp_path, Archive(f"sqlite:///{tmp_path / 'history.db'}")), 30.0)
+    asked = {"begin_s": START_NS / S, "end_s": air.now_ns / S + 1.0}
+    with browser(air) as client:
+        whole = client.get(f"{API}/history/trails.geojson", params=asked).json()
+        monkeypatch.setattr(past, "MOST_POINTS", 2)
+        cut = client.get(f"{API}/history/trails.geojson", params=asked).json()
+    times_s, first_s = (each["features"][0]["properties"]["times_s"] for each in (whole, cut))
+    assert len(times_s) > 3
+    assert whole["until_s"] == pytest.approx(asked["end_s"], abs=1e-6)
+    assert (first_s, cut["until_s"]) == (times_s[:2], times_s[2])
 
 
 def test_a_time_is_exported_as_a_file(tmp_path: Path) -> None:

@@ -17,6 +17,8 @@ from sa_hub.page.views import track_view
 WEB = Path(__file__).parents[2] / "services/sa-hub/web"
 NOW_NS = 1_790_000_000_000_000_000
 COUNT = 200
+LISTS = ("tracks", "places", "labels", "views", "climbs", "recalls")
+NOTHING: dict[str, Any] = {"ages": {}} | {name: [] for name in LISTS}
 pytestmark = pytest.mark.skipif(
     not (WEB / "node_modules" / "mgrs").is_dir(), reason="npm packages of the page are not there: make page"
 )
@@ -46,7 +48,7 @@ def page_says(asked: dict[str, Any]) -> dict[str, Any]:
         return_completed_process=True,
         capture_output=True,
         text=True,
-        input=json.dumps({"tracks": [], "places": [], "ages": {}, "labels": [], "views": []} | asked),
+        input=json.dumps(NOTHING | asked),
         cwd=WEB,
     )
     assert done.returncode == 0, done.stderr
@@ -130,3 +132,23 @@ def test_places_lie_on_the_screen_as_web_mercator_has_them() -> None:
     assert said[0] == pytest.approx([500.0, 400.0])
     assert said[1] == pytest.approx([628.0, 144.0], abs=1e-3)
     assert said[2] == pytest.approx([500.0 + 1024.0 * 2.0 / 360.0, 400.0])
+
+
+def test_an_arrow_tells_of_another_floor_only_while_that_is_news() -> None:
+    points = [{"time_s": 100.0 + n, "place": [18.0, 59.0], "floor": int(n >= 5)} for n in range(10)]
+    asked = [{"points": points, "floor": 1, "now_s": 100.0 + after_s} for after_s in (9.0, 24.0, 25.0, 900.0)]
+    assert page_says({"climbs": asked})["climbs"] == ["▲", "▲", "", ""]
+
+
+def test_trails_of_the_past_reach_the_moment_though_an_answer_is_cut() -> None:
+    """40 soldiers at 2 Hz, 20 s a beat; an answer has 5,000 reports: 62.5 s of 900 s."""
+    begin_s, moments = 10_000.0, [10_000.0, 10_020.0, 10_040.0, 10_700.0]
+    asked = {"names": [f"a{n}" for n in range(40)], "period_s": 0.5, "most": 5000, "speed": 30}
+    (looks,) = page_says({"recalls": [asked | {"moments": moments}]})["recalls"]
+    for moment_s, look in zip(moments, looks, strict=True):
+        for times_s in look["times_s"].values():
+            wanted = [moment_s - 180.0 + 0.5 * n for n in range(361)]
+            assert [each for each in times_s if moment_s - 180.0 <= each <= moment_s] == wanted
+    # 300 s before the moment and what follows: five answers of 62.5 s reach 12.5 s beyond it.
+    assert [look["questions"] for look in looks] == [5, 10, 15, 20]
+    assert begin_s in looks[0]["times_s"]["a0"]

@@ -15,7 +15,7 @@ from support.hub_squad import ORIGIN, START_NS, S
 METRE_DEG = 1.0 / 111_133.0
 GRID, CODEC = Grid(ORIGIN), Codec(ORIGIN)
 FULL = Room(4000.0, 4000.0, 1200.0, 16000.0, 80.0)
-HALF_EMPTY = Room(1500.0, 4000.0, 40.0, 1600.0, 80.0)
+HALF_EMPTY = Room(1500.0, 4000.0, 10.0, 1600.0, 80.0)
 
 
 def at(seconds: float, facing_deg: float | None, north_m: float = 0.0, north_m_s: float = 0.0) -> Report:
@@ -38,7 +38,7 @@ class Told:
         self.room, self.plan = room, Scheduler(Policy(), own=1, grid=GRID)
         self.sent_bits: list[int] = []
         for second in range(waited_s):  # the price of bits follows the bucket
-            self.plan.pass_time(room, START_NS - (waited_s - second) * S)
+            self.plan.pass_time(room, 1, START_NS - (waited_s - second) * S)
 
     def report(self, report: Report) -> Reports | Update | None:
         content = self.plan.plan([report], self.room, report.time_ns)

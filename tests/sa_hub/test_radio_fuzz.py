@@ -13,6 +13,7 @@ from sa_hub.radio.content import Content, Entry, Report, Reports, Update
 from sa_hub.radio.control import Acknowledgement, Asked, Control, Fragment, Request
 from sa_hub.radio.frame import Codec
 from sa_hub.radio.grid import Grid
+from sa_hub.radio.layout import VERSION
 from sa_hub.radio.net_keys import TagBytes
 from sa_hub.radio.references import References
 from support.hub_squad import ORIGIN, START_NS, Air, S, Walk, hub, link
@@ -118,7 +119,7 @@ def test_a_flood_of_garbage_at_link_rate_delays_no_good_frame() -> None:
     for _ in range(600):
         air.run(0.1, {"a1": Walk()})
         for _ in range(11):
-            garbage = bytes([0x80, 0x10 | rng.randrange(8)]) + rng.randbytes(9)
+            garbage = bytes([VERSION << 6, 0x10 | rng.randrange(8)]) + rng.randbytes(9)
             air.hubs["a2"].receive("squad", garbage, air.now_ns)
     air.run(0.1, {})
     refused = air.hubs["a2"].figures().counters

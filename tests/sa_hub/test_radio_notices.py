@@ -15,7 +15,8 @@ from sa_hub.radio.control import MOST_ACKNOWLEDGED, Acknowledgement, Asked, Frag
 from sa_hub.radio.fragments import CAPACITY as MOST_COLLECTED
 from sa_hub.radio.fragments import HEAD_BYTES, KEEP_NS, Collector, Cutter
 from sa_hub.radio.outbox import CAPACITY, Outbox, Sending
-from support.hub_squad import START_NS, Air, S, Walk, hub, link, own_identity
+from support.hub_squad import GROUP_KEY, ORIGIN, START_NS, Air, S, Walk, hub, link, own_identity
+from support.radio_ear import RadioEar
 
 
 def alert(seconds: float = 0.0, text: str = "") -> AlertNotice:
@@ -89,6 +90,42 @@ def test_an_alert_rests_once_everybody_heard_lately_has_acknowledged_any_of_its_
     assert box.due(START_NS + 30 * S, [2, 3]) is None
     assert box.given_up == 0
     assert box.due(START_NS + 40 * S, [2, 3]) is None
+
+
+def send_all(box: Outbox, after_s: int, counter: int) -> None:
+    """Send what is due, in frames that count on from ``counter``."""
+    while sending := box.due(START_NS + after_s * S, []):
+        sending.sent(START_NS + after_s * S, counter)
+        counter += 1
+
+
+def test_an_acknowledgement_is_not_of_an_older_frame_with_the_same_low_bits() -> None:
+    """On a fast net 256 frames are ten seconds, and an alert that nobody has heard is still being repeated."""
+    box = Outbox("seed")
+    box.post(alert(0), START_NS)
+    send_all(box, 0, 300)
+    box.post(alert(5), START_NS)
+    send_all(box, 5, 300 + 255)
+    box.acknowledged(2, (300 + 256) % 256)
+    sending = box.due(START_NS + 30 * S, [2])
+    assert sending is not None
+
+
+@pytest.mark.parametrize("counters", [(3,), (3, 301)])
+def test_an_acknowledgement_is_not_of_an_earlier_epochs_frame_with_the_same_low_bits(
+    counters: tuple[int, ...],
+) -> None:
+    box = Outbox("seed")
+    box.post(alert(0), START_NS)
+    send_all(box, 0, 300)
+    for counter in counters:  # of the next epoch
+        box.post(alert(counter), START_NS)
+        send_all(box, 0, counter)
+    box.acknowledged(2, 300 % 256)
+    sending = box.due(START_NS + 30 * S, [2])
+    assert sending is not None
+    assert sending.content == alert(0)
+    assert sending.content == alert(0)
 
 
 def test_an_alert_that_nobody_was_there_to_hear_waits_for_the_first_who_comes() -> None:
@@ -180,6 +217,10 @@ def test_many_acknowledgements_go_in_several_frames_and_a_flood_is_bounded() -> 
 # -- long texts -----------------------------------------------------------------------------------------------
 
 
+def unheeded(_now_ns: int) -> None:
+    """Nobody waits for this acknowledgement."""
+
+
 @given(st.binary(min_size=1, max_size=400), st.integers(24, 250), st.randoms(use_true_random=False))
 @settings(deadline=None)
 def test_a_payload_in_parts_is_put_together_in_any_order_with_repeats(data: bytes, limit: int, rng) -> None:  # type: ignore[no-untyped-def]
@@ -190,7 +231,7 @@ def test_a_payload_in_parts_is_put_together_in_any_order_with_repeats(data: byte
     rng.shuffle(arriving)
     collector, whole = Collector(), []
     for part in arriving:
-        payload = collector.add(7, part, START_NS)
+        payload = collector.add(7, part, START_NS, unheeded)
         if payload is not None:
             whole.append(payload)
     assert all(len(part.data) <= size for part in parts)
@@ -199,11 +240,29 @@ def test_a_payload_in_parts_is_put_together_in_any_order_with_repeats(data: byte
 
 def test_parts_are_kept_neither_long_nor_in_great_number() -> None:
     collector = Collector()
-    assert collector.add(7, Fragment(1, 0, 1, b"a"), START_NS) is None
-    assert collector.add(7, Fragment(1, 1, 1, b"b"), START_NS + KEEP_NS + 1) is None
+    assert collector.add(7, Fragment(1, 0, 1, b"a"), START_NS, unheeded) is None
+    assert collector.add(7, Fragment(1, 1, 1, b"b"), START_NS + KEEP_NS + 1, unheeded) is None
     for sender in range(1000):
-        collector.add(sender, Fragment(1, 0, 15, bytes(255)), START_NS + KEEP_NS + 1)
+        collector.add(sender, Fragment(1, 0, 15, bytes(255)), START_NS + KEEP_NS + 1, unheeded)
     assert len(collector) <= MOST_COLLECTED
+
+
+def test_parts_are_acknowledged_when_all_are_there_and_again_when_one_is_repeated() -> None:
+    collector, acknowledged = Collector(), list[tuple[str, int]]()
+
+    def hear(index: int, name: str, now_ns: int, source: int = 7) -> bytes | None:
+        part = Fragment(1, index, 1, b"ab"[index : index + 1])
+        return collector.add(source, part, now_ns, lambda at_ns: acknowledged.append((name, at_ns)))
+
+    assert hear(0, "first", START_NS) is None
+    assert hear(0, "first, repeated", START_NS + S) is None
+    assert acknowledged == []
+    assert hear(1, "last", START_NS + 2 * S) == b"ab"
+    assert acknowledged == [("first, repeated", START_NS + 2 * S), ("last", START_NS + 2 * S)]
+    assert hear(0, "ours got lost", START_NS + 3 * S) is None
+    assert acknowledged[2:] == [("ours got lost", START_NS + 3 * S)]
+    assert hear(0, "of another payload", START_NS + 3 * S, source=8) is None
+    assert len(acknowledged) == 3
 
 
 def said(soldier: str, subject: str, message: Message) -> Envelope:
@@ -251,6 +310,19 @@ def test_alerts_reach_everybody_in_time_at_thirty_percent_loss_while_positions_f
     assert figure.never == 0
     # One in 15,000 misses all eight frames of the first 7.5 s.
     assert figure.within_pct == 100.0
+
+
+def test_an_alert_stamped_ahead_of_time_goes_at_once_though_it_comes_before_the_first_tick() -> None:
+    core, ear = hub("a1", link("squad")), RadioEar("squad", GROUP_KEY, ORIGIN)
+    core.handle(said("a1", "alert", Alert(time_ns=START_NS + 300 * S, soldier="a1", kind="help")))
+    heard = []
+    for tenth in range(1, 51):
+        now_ns = START_NS + tenth * S // 10
+        core.tick(now_ns)
+        frames = [ear.content(frame.data, now_ns) for frame in core.take_frames()]
+        heard += [tenth for frame in frames if frame is not None and isinstance(frame[1], AlertNotice)]
+    assert heard[0] <= 2, "the budget begins with the first tick"
+    assert len(heard) > 3, "and is repeated"
 
 
 def test_an_alert_goes_at_once_though_all_else_uses_up_the_budget() -> None:

@@ -11,10 +11,10 @@ from sa_hub.radio.content import Feedback, Report, Reports, Update
 from sa_hub.radio.counters import MemoryCounters
 from sa_hub.radio.frame import Codec
 from sa_hub.radio.grid import Grid
-from sa_hub.radio.hearing import Hearing
+from sa_hub.radio.hearing import KEEPS_NS, Hearing
 from sa_hub.radio.listeners import Listeners
 from sa_hub.radio.net import RadioNet
-from sa_hub.radio.pacing import Pacing
+from sa_hub.radio.pacing import CHEAPEST, Pacing, usual_level
 from sa_hub.radio.persistence import Persistence
 from sa_hub.radio.picture import Spoken
 from sa_hub.radio.relevance import LEADER, NEAR_OTHERS, NEAR_SEEN, Relevance
@@ -28,6 +28,7 @@ from support.hub_squad import GROUP_KEY, ORIGIN, START_NS, S
 METRE_DEG = 1.0 / 111_133.0
 GRID, CODEC = Grid(ORIGIN), Codec(ORIGIN)
 WIDE = Room(2000.0, 4000.0, 1200.0, 1600.0, 80.0)
+NARROW = replace(WIDE, rate_bits_per_s=5.0)
 
 
 def at(number: int, seconds: float, north_m: float = 0.0, **options: object) -> Report:
@@ -51,7 +52,7 @@ def tell(plan: Scheduler, squad: list[Report], room: Room = WIDE, counter: int =
     now_ns = max(report.time_ns for report in squad)
     if not plan.is_due(now_ns):
         return []
-    plan.pass_time(room, now_ns)
+    plan.pass_time(room, len(squad), now_ns)
     content = plan.plan(squad, room, now_ns)
     if content is None:
         return []
@@ -67,11 +68,35 @@ def test_who_was_never_told_is_told_at_once_and_in_full() -> None:
 
 def test_a_prediction_that_holds_is_not_told_and_one_that_fails_is() -> None:
     plan = scheduler()
-    assert tell(plan, [at(1, 0.0, north_m_s=1.0)]) == [1]
+    assert tell(plan, [at(1, 0.0, north_m_s=1.0)], room=NARROW) == [1]
     for tenths in range(2, 80, 2):
         # Damped by 60 s, the prediction is 0.5 m short after 8 s.
-        assert tell(plan, [at(1, tenths / 10, north_m=tenths / 10, north_m_s=1.0)], counter=1) == []
-    assert tell(plan, [at(1, 9.0, north_m=30.0, north_m_s=1.0)], counter=1) == [1]
+        assert (
+            tell(plan, [at(1, tenths / 10, north_m=tenths / 10, north_m_s=1.0)], room=NARROW, counter=1) == []
+        )
+    assert tell(plan, [at(1, 9.0, north_m=30.0, north_m_s=1.0)], room=NARROW, counter=1) == [1]
+
+
+@pytest.mark.parametrize("rate_bits_per_s", [75.0, 300.0, 1200.0, 9600.0])
+def test_at_ordinary_rates_who_is_where_he_was_told_is_only_told_in_full_again_ever_more_seldom(
+    rate_bits_per_s: float,
+) -> None:
+    """Bits to spare go to who may have missed it all; news goes at once."""
+    plan, room = scheduler(), replace(WIDE, rate_bits_per_s=rate_bits_per_s)
+    assert tell(plan, [at(1, 0.0)], room) == [1]
+    told_s = [0.0]
+    for fifths in range(1, 150):
+        now_ns = START_NS + fifths * S // 5
+        plan.pass_time(room, 1, now_ns)
+        content = plan.plan([at(1, fifths / 5)], room, now_ns)
+        if content is not None:
+            assert isinstance(content, Reports)
+            plan.sent(1, content, now_ns)
+            told_s.append(fifths / 5)
+    pauses_s = [after - before for before, after in itertools.pairwise(told_s)]
+    assert all(after > 1.5 * before for before, after in itertools.pairwise(pauses_s))
+    assert 2 <= len(pauses_s) <= 4  # after 1, 2, 4 and 8 s, or after 3 times what it takes of the budget
+    assert tell(plan, [at(1, 30.0, north_m=30.0)], room, counter=1) == [1]
 
 
 def test_what_the_net_told_itself_is_never_repeated_to_it() -> None:
@@ -104,10 +129,10 @@ def test_after_the_clock_was_set_back_all_is_told_in_full() -> None:
 
 def test_what_is_forgotten_is_told_in_full_again() -> None:
     plan = scheduler()
-    tell(plan, [at(1, 0.0), at(2, 0.0)])
-    assert plan.plan([at(1, 1.0), at(2, 1.0)], WIDE, START_NS + S) is None
+    tell(plan, [at(1, 0.0), at(2, 0.0)], NARROW)
+    assert plan.plan([at(1, 1.0), at(2, 1.0)], NARROW, START_NS + S) is None
     plan.forget([2])
-    content = plan.plan([at(1, 2.0), at(2, 2.0)], WIDE, START_NS + 2 * S)
+    content = plan.plan([at(1, 2.0), at(2, 2.0)], NARROW, START_NS + 2 * S)
     assert isinstance(content, Reports)
     assert [report.number for report in content.reports] == [2]
 
@@ -133,18 +158,45 @@ def test_later_news_go_as_an_update_and_only_what_has_changed() -> None:
 
 def test_the_price_rises_as_the_bucket_empties_and_settles_where_it_is_half_full() -> None:
     pacing = Pacing()
+    pacing.passed(
+        600.0, 0.5, -2.0
+    )  # long after the start, when an empty bucket was as good as a half full one
     prices = []
     for fill in (1.0, 0.75, 0.5, 0.25, 0.0):
-        pacing.passed(0.0, fill)
+        pacing.passed(0.0, fill, -2.0)
         prices.append(pacing.price)
     ratios = [after / before for before, after in itertools.pairwise(prices)]
     assert ratios == pytest.approx([math.e] * 4)  # four e-folds from full to empty
     for _ in range(60):
-        pacing.passed(1.0, 0.5)
-    assert pacing.price == pytest.approx(prices[2])
+        pacing.passed(1.0, 0.5, -2.0)
+    # What was wanted was short of a half by 0.5 · e^-10 when these began, which is 9e-5 of the price.
+    assert pacing.price == pytest.approx(prices[2], rel=2e-4)
     for _ in range(60):
-        pacing.passed(1.0, 1.0)
+        pacing.passed(1.0, 1.0, -2.0)
     assert pacing.price < prices[0]
+
+
+def test_an_empty_bucket_makes_bits_dear_only_after_the_start() -> None:
+    pacing = Pacing()
+    pacing.passed(1.0, 0.0, -2.0)
+    early = pacing.price
+    for _ in range(59):
+        pacing.passed(1.0, 0.0, -2.0)
+    assert early == pytest.approx(math.exp(-2.0), rel=0.05)
+    assert pacing.price > math.e * early
+
+
+def test_the_price_begins_where_the_budget_is_just_spent() -> None:
+    """Twelve at 34 bit/s: one frame takes 80 + 12 * 18 = 296 bits, 8.7 s, in which 1.2 m/s make 10.4 m."""
+    narrow = Room(1000.0, 1360.0, 34.0, 1600.0, 80.0)
+    assert usual_level(narrow, 12, 0.6) == pytest.approx(math.log(6 * 9.847**1.6 / 296.0), abs=1e-3)
+    assert usual_level(replace(narrow, rate_bits_per_s=3400.0), 12, 0.6) == CHEAPEST
+    assert usual_level(narrow, 0, 0.6) == CHEAPEST
+    pacing = Pacing()
+    pacing.passed(0.0, 0.0, usual_level(narrow, 1, 0.6))
+    one = pacing.price
+    pacing.passed(0.0, 0.0, usual_level(narrow, 12, 0.6))
+    assert pacing.price > 5.0 * one  # at once when there are more to tell of
 
 
 def squad_net(rate_bits_per_s: int, **options: object) -> RadioNet:
@@ -285,33 +337,74 @@ def test_a_listener_that_has_long_been_silent_is_dropped() -> None:
     assert listeners._certain.rows == 1
 
 
+def test_who_falls_silent_no_longer_tells_though_nobody_else_says_anything() -> None:
+    """A net parts: from then on nobody is known to hear us, and what he has is left to chance again."""
+    plan = scheduler(loss=0.2)
+    tell(plan, [at(1, 0.0)])
+    plan.listeners.heard_from(9, START_NS)
+    plan.told_what_was_heard(9, Feedback(1, 0, 4, 0), START_NS)
+    for second, tells in ((300, True), (301, False), (900, False)):
+        plan.pass_time(WIDE, 1, START_NS + second * S)
+        assert plan.listeners.all_tell is tells
+        assert plan.listeners.tell is tells
+    assert not list(plan.known_by_listeners())
+    plan.sent(1, Reports((at(1, 901.0),)), START_NS + 901 * S)
+    assert len(set(plan.listeners.pictures.time_s[:, 0].tolist())) > 1
+
+
+def test_who_is_gone_and_told_nothing_no_longer_keeps_stand_ins() -> None:
+    listeners = Listeners(0.5, seed=1)
+    listeners.widen(1)
+    listeners.heard_from(8, START_NS)
+    listeners.spoke(0, spoken(0))
+    listeners.heard_from(9, START_NS + 200 * S)
+    listeners.told(9, Feedback(1, 0, 4, 0), START_NS + 200 * S)
+    listeners.pass_time(START_NS + 300 * S)
+    assert (listeners.all_tell, listeners.pictures.known.all()) == (False, False)
+    listeners.pass_time(START_NS + 301 * S)
+    assert (listeners.all_tell, listeners.pictures.known.all()) == (True, True)
+
+
 def test_feedback_goes_to_who_was_missed_and_costs_nothing_otherwise() -> None:
     hearing = Hearing()
     hearing.heard_telling(5, epoch=1, counter=10, soldiers=[7])
-    first = hearing.due({5: Heard(1, 19, mask=0b11_1111_1111)}.get, 1)
+    first = hearing.due({5: Heard(1, 19, mask=0b11_1111_1111)}.get, 1, START_NS)
     assert first == Feedback(5, 19, 32, 0b1_1111_1111)
-    feedback = hearing.due({5: Heard(1, 20, mask=0b111_1110_0111)}.get, 1)
+    feedback = hearing.due({5: Heard(1, 20, mask=0b111_1110_0111)}.get, 1, START_NS)
     # The first goes back as far as feedback can, to what was told in full before the first update.
     assert feedback == Feedback(5, 20, 32, 0b0011_1111_0011)
     hearing.heard_telling(6, epoch=1, counter=15, soldiers=[8, 9, 10])
     memory = {5: Heard(1, 20, mask=0b111_1110_0111), 6: Heard(1, 20, mask=0b10_0001)}
-    other = hearing.due(memory.get, 1)
+    other = hearing.due(memory.get, 1, START_NS)
     assert other is not None
     assert other.about == 6  # fewer frames, but of more soldiers
-    hearing.sent(feedback)
-    assert hearing.due({5: Heard(1, 20, mask=0b111_1110_0111)}.get, 1) is None
-    assert hearing.due(lambda _sender: None, 1) is None
-    feedback = hearing.due({5: Heard(1, 24, mask=0b111_1110_0111_0111)}.get, 1)
+    hearing.sent(feedback, START_NS)
+    assert hearing.due({5: Heard(1, 20, mask=0b111_1110_0111)}.get, 1, START_NS) is None
+    assert hearing.due(lambda _sender: None, 1, START_NS) is None
+    feedback = hearing.due({5: Heard(1, 24, mask=0b111_1110_0111_0111)}.get, 1, START_NS)
     assert feedback is not None
     assert feedback.span == 16  # from the one before the last on
+
+
+def test_feedback_is_kept_fresh_where_bits_are_cheap() -> None:
+    hearing = Hearing()
+    hearing.heard_telling(5, epoch=1, counter=10, soldiers=[7])
+    hearing.sent(Feedback(5, 10, 32, 0), START_NS)
+    memory = {5: Heard(1, 12, mask=0b111)}
+    assert hearing.due(memory.get, 1, START_NS + KEEPS_NS - 1, cheap=True) is None
+    assert hearing.due(memory.get, 1, START_NS + KEEPS_NS, cheap=True) is not None
+    assert hearing.due(memory.get, 1, START_NS + KEEPS_NS, cheap=False) is None
+    assert hearing.due({5: Heard(1, 10, mask=0b1)}.get, 1, START_NS + KEEPS_NS, cheap=True) is None
+    hearing.set_back(KEEPS_NS)
+    assert hearing.due(memory.get, 1, START_NS, cheap=True) is not None
 
 
 def test_who_tells_of_many_spends_nothing_on_who_tells_of_few() -> None:
     hearing = Hearing()
     hearing.heard_telling(5, epoch=1, counter=10, soldiers=[7])
     memory = {5: Heard(1, 20, mask=0b111_1110_0111)}
-    assert hearing.due(memory.get, 3) is None
-    assert hearing.due(memory.get, 2) is not None
+    assert hearing.due(memory.get, 3, START_NS) is None
+    assert hearing.due(memory.get, 2, START_NS) is not None
 
 
 def test_a_listener_has_only_what_it_said_to_have_heard() -> None:

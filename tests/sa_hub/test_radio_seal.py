@@ -16,30 +16,13 @@ from sa_hub.radio.header import Header, read_header
 from sa_hub.radio.replay import Heard
 from sa_hub.radio.replay_file import LAG, MemoryFile
 from sa_hub.radio.seal import NetKeys, Opener, Sealer
+from support.host_clock import JAN_2026_S, HostClock
 
 KEY = bytes(range(32))
 NOW_NS = 1_790_000_000_000_000_000
 S = 1_000_000_000
 KEYS = NetKeys(KEY, "squad", 8)
-JAN_2026_S = 1_767_225_600.0
 SECONDS_2020_TO_2026 = 2192 * 86_400  # six years, two of them leap years
-
-
-class HostClock:
-    """A computer's clock that goes on when somebody sleeps."""
-
-    def __init__(self, now_s: float = JAN_2026_S) -> None:
-        self.now_s = now_s
-
-    def __call__(self) -> float:
-        return self.now_s
-
-    def sleep(self, seconds: float) -> None:
-        self.now_s += seconds
-
-    def counters(self, path: Path, block: int = 4, earlier_life: Path | None = None) -> FileCounters:
-        """A source of counters in a file, on this clock."""
-        return FileCounters(path, self, block, earlier_life=earlier_life, sleep=self.sleep)
 
 
 def sealer(number: int = 7, epoch: int = 1, keys: NetKeys = KEYS) -> Sealer:
@@ -83,6 +66,42 @@ def test_full_headers_come_ever_more_rarely_and_often_again_when_asked_for() -> 
     assert full_headers(sender, 0, 400) == [0, 1, 3, 7, 15, 31, 63, 127, 247, 367]
     sender.full_headers.begin()
     assert full_headers(sender, 400, 420) == [400, 401, 403, 407, 415]
+
+
+def test_full_headers_are_rare_at_once_where_all_tell_what_they_hear() -> None:
+    sender = sealer()
+    assert full_headers(sender, 0, 5) == [0, 1, 3]
+    sender.full_headers.known = True
+    assert full_headers(sender, 5, 300) == [123, 243]
+    sender.full_headers.known = (
+        False  # somebody new was heard; eight times 1 s after 123 s, twice that after 243 s
+    )
+    assert full_headers(sender, 300, 400) == [300, 332, 396]
+
+
+@pytest.mark.parametrize("asked_s", [10, 300])
+def test_who_asks_for_full_headers_has_the_whole_row_though_all_others_tell_what_they_hear(
+    asked_s: int,
+) -> None:
+    """One full header alone may be lost, and the asker would be deaf until he asks again."""
+    sender = sealer()
+    full_headers(sender, 0, 5)
+    sender.full_headers.known = True
+    full_headers(sender, 5, asked_s)
+    sender.full_headers.asked(NOW_NS + asked_s * S)
+    row = full_headers(sender, asked_s, asked_s + 300)
+    assert [second - asked_s for second in row] == [0, 1, 3, 7, 15, 31, 63, 127, 247]
+
+
+def test_the_row_for_who_asked_goes_on_after_the_clock_was_set_back() -> None:
+    sender = sealer()
+    sender.full_headers.known = True
+    sender.full_headers.asked(NOW_NS + 100 * S)
+    assert full_headers(sender, 100, 105) == [100, 101, 103]
+    sender.set_back(100 * S)
+    assert full_headers(sender, 5, 20) == [7, 15]
+    sender.full_headers.asked(NOW_NS + 9 * S)  # less than 10 s after it was asked for last
+    assert full_headers(sender, 20, 40) == [31]
 
 
 @settings(deadline=None)

@@ -136,7 +136,7 @@ def test_what_is_not_for_us_is_counted_by_its_cause(spoil: str) -> None:
     frame = net.speak([at(1, 10.0)], START_NS + 10 * S)[0]
     known = [5] if spoil == "sender" else NUMBERS
     ear = net if spoil == "echo" else hearing
-    data = b"\xff" * 30 if spoil == "garbage" else frame
+    data = bytes(30) if spoil == "garbage" else frame
     assert ear.hear(data, START_NS, known, exercise=spoil == "exercise") is None
     causes = {"sender": "unknown_sender", "exercise": "exercise", "echo": "own_echo", "garbage": "version"}
     assert dict(ear.meter.rejected) == {causes[spoil]: 1}

@@ -338,7 +338,7 @@ def test_no_receiver_is_ever_told_a_wrong_place(
         latitude += (north_m + jump_m) / METRES_PER_DEG
         longitude = (longitude + east_m / (METRES_PER_DEG * cosine) + 180.0) % 360.0 - 180.0
         report = Report(7, now_ns, latitude, longitude, 1.0, east_m, north_m, hops=1)
-        scheduler.pass_time(ROOM, now_ns)
+        scheduler.pass_time(ROOM, 2, now_ns)
         plan = scheduler.plan([report, replace(report, number=8, latitude_deg=place[0])], ROOM, now_ns)
         if plan is None:
             continue

@@ -8,7 +8,7 @@ import pytest
 from pdr_engine.body import BodyNavigator, BodySettings
 from pdr_engine.body.methods import METHODS
 from proving_ground.evaluation.body import body_chain, body_track, walk_body
-from proving_ground.evaluation.body_fixes import Receiver, pns_track, with_fixes
+from proving_ground.evaluation.body_fixes import Receiver, pns_walk, with_fixes
 from proving_ground.evaluation.evaluate import evaluate_task, methods_of, plan
 from proving_ground.evaluation.floors import Floors, floors_right_pct
 from sensor_gateway.recordings import load_runs
@@ -118,11 +118,11 @@ def test_poor_fixes_change_nothing(folder: Path) -> None:
     alone = body_track(walk_body(run, BodySettings()).steps, run.imus["body"])
     heard = body_track(walk_body(poor, BodySettings()).steps, run.imus["body"])
     np.testing.assert_array_equal(heard.position_m, alone.position_m)
-    filtered = pns_track(poor, BodySettings())
+    filtered = pns_walk(poor, BodySettings())[1]
     np.testing.assert_allclose(
         filtered.position_m[-1, :2] - filtered.position_m[0, :2],
         alone.position_m[-1, :2] - alone.position_m[0, :2],
         atol=1e-9,
     )
     good = with_fixes(run, Receiver("good", 3.0, 1.0), like, seed=2)
-    assert not np.allclose(pns_track(good, BodySettings()).position_m[-1, :2], filtered.position_m[-1, :2])
+    assert not np.allclose(pns_walk(good, BodySettings())[1].position_m[-1, :2], filtered.position_m[-1, :2])

@@ -130,11 +130,21 @@ def test_a_crowd_is_named_or_misleads_nobody() -> None:
     assert all(np.linalg.norm(motion.translation_m) < 0.1 for motion in motions(said))
 
 
-def test_sight_that_comes_back_late_begins_a_new_chain() -> None:
+def test_sight_that_comes_back_knows_the_key_frame_again() -> None:
+    """More than a second of darkness in a room that stays in view: the chain holds, and is right."""
     zone = LightZone("dark", EVERYWHERE, 0.995, start_s=0.95, end_s=2.05)
-    said = told(render(room(zones=(zone,)), WALK, 2.6))
+    walked = render(room(zones=(zone,)), WALK, 2.6)
+    said = told(walked)
     again = next(one for one in said[12:] if isinstance(one, CameraMotion))
-    assert again.start_time_ns >= 2_100_000_000
+    assert (again.start_time_ns, again.time_ns) == (600_000_000, 2_100_000_000)
+    assert np.linalg.norm(walked.error(again, SMALL.rate_hz)[:3]) < 0.03
+
+
+def test_sight_that_comes_back_late_begins_a_new_chain() -> None:
+    zone = LightZone("dark", EVERYWHERE, 0.995, start_s=0.55, end_s=3.95)
+    said = told(render(room(2.0, zones=(zone,)), Straight((-8.0, 0.0, 1.5), (1.2, 0.0, 0.0)), 4.3))
+    again = next(one for one in said[7:] if isinstance(one, CameraMotion))
+    assert again.start_time_ns >= 4_000_000_000
 
 
 def test_a_single_dark_pair_breaks_nothing(walk: Sequence) -> None:
@@ -142,6 +152,14 @@ def test_a_single_dark_pair_breaks_nothing(walk: Sequence) -> None:
     pairs = tuple((black, black) if number == 5 else pair for number, pair in enumerate(walk.pairs[:12]))
     said = told(Sequence(pairs, walk.place_m, walk.attitude))
     assert [number for number, one in enumerate(said) if isinstance(one, Verdict)] == [0, 5]
+    track_end(said)
+
+
+def test_nobody_leaps_half_a_second_ahead_and_back(walk: Sequence) -> None:
+    """A view that fits the room perfectly, but where nobody can have been pushed to within a tenth of a second."""
+    pairs = tuple(walk.pairs[13] if number == 8 else pair for number, pair in enumerate(walk.pairs[:12]))
+    said = told(Sequence(pairs, walk.place_m, walk.attitude))
+    assert [number for number, one in enumerate(said) if isinstance(one, Verdict)] == [0, 8]
     track_end(said)
 
 

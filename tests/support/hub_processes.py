@@ -24,19 +24,17 @@ from support.routers import running_router
 from support.waiting import wait_until
 
 A1, CP = Identity("bp", "alpha", "a1"), Identity("bp", "hq", "cp")
-_REALM = """
-id = "bp"
-origin = { latitude_deg = 59.35, longitude_deg = 18.07, height_m = 50.0 }
-roster = [
-    { id = "a1", number = 1, unit = "alpha", callsign = "Alpha 1" },
-    { id = "cp", number = 100, unit = "hq" },
-]
-"""
+_ORIGIN = "{ latitude_deg = 59.35, longitude_deg = 18.07, height_m = 50.0 }"
+_BOTH = (
+    '{ id = "a1", number = 1, unit = "alpha", callsign = "Alpha 1" }',
+    '{ id = "cp", number = 100, unit = "hq" }',
+)
 
 
-def write_realm(folder: Path) -> None:
-    """Realm file and group key for both."""
-    (folder / "realm.toml").write_text(_REALM)
+def write_realm(folder: Path, members: Sequence[str] = _BOTH) -> None:
+    """Realm file, with a roster of these inline tables, and group key."""
+    roster = ",\n    ".join(members)
+    (folder / "realm.toml").write_text(f'id = "bp"\norigin = {_ORIGIN}\nroster = [\n    {roster},\n]\n')
     create_group_key(folder / "keys" / "group.key")
 
 
@@ -95,7 +93,7 @@ def running(config: Path, identity: Identity, within: Sequence[str] = ()) -> Ite
             wait_until(lambda: bus.alive(identity.selector("health")), what="the hub's liveliness token")
             yield hub
             process.terminate()
-            assert process.wait(timeout=30) == 0
+            assert process.wait(timeout=60) == 0
         finally:
             bus.close()
             process.kill()

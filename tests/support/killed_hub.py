@@ -1,9 +1,10 @@
 """kill -9 of a command post's hub in the middle of writing: ``python -m support.killed_hub --kills 50``.
 
-A real ``sa-hub`` with archive and page is fed over its bus, while somebody alerts over the page and a recorder
-writes the bus. Hub and recorder are killed at a random moment. Then the archive and the recording are opened: every
-alert that the page had answered is there, at least as many statuses as health had told of, every line of the audit
-but a cut one, and all of the recording that could be read before.
+A real ``sa-hub`` with archive and page is fed over its bus; somebody alerts over the page, a soldier alerts over
+the radio, and a recorder writes the bus. Hub and recorder are killed at a random moment. Then the archive and the
+recording are opened: every alert that the page had answered or the radio acknowledged is there, at least as many
+statuses as health had told of, every line of the audit but a cut one, and all of the recording that could be read
+before.
 """
 
 import json
@@ -30,7 +31,7 @@ import typer
 from bootprint.bus import Envelope
 from bootprint.commands.options import Json, write_json
 from bootprint.errors import RecordingError
-from bootprint.messages import Health, Status
+from bootprint.messages import Alert, Health, Status
 from bootprint.recording import Recording
 from bootprint.zenoh_bus import ZenohBus, open_bus
 from proving_ground.exercises.stage import free_ports
@@ -38,11 +39,14 @@ from sa_hub.history.archive import Archive
 from sa_hub.history.settings import DEFAULT_SUBJECTS
 from support.databases import new_database, postgres
 from support.hub_processes import CP, command, write_computer, write_realm
+from support.radio_soldier import RadioSoldier
 from support.routers import running_router
 from support.waiting import wait_until
 
 END: Final = 2**62
-_LINK: Final = 'bind = "127.0.0.1:0"\npeers = ["127.0.0.1:9"]\nrate_bits_per_s = 9600'
+_RADIO_STEP_S: Final = 0.05
+_RADIO_STEPS: Final = 8
+"""The soldier alerts every so many steps."""
 _FEED_S: Final = 0.002
 _PATIENCE_S: Final = 240.0
 _RECORD: Final = "from bootprint.cli import main; main()"
@@ -64,11 +68,12 @@ class Trial:
 
     def __post_init__(self) -> None:
         write_realm(self.folder)
+        self.soldier = RadioSoldier(self.folder)
         hub = (
             f'role = "command_post"\n[hub.history]\nurl = "{self.url}"\n'
             f"[hub.page]\nport = {self.port}\nchanges_per_s = 1000.0"
         )
-        self.config = write_computer(self.folder, "cp", hub, _LINK)
+        self.config = write_computer(self.folder, "cp", hub, self.soldier.way)
 
     @property
     def log(self) -> Path:
@@ -115,7 +120,8 @@ class Trial:
     def _feeding(self, bus: ZenohBus) -> Iterator[None]:
         """Somebody tells and alerts all the while, whether or not there is still a hub."""
         stop = threading.Event()
-        threads = [threading.Thread(target=each, args=(bus, stop)) for each in (self._feed, self._alert)]
+        feeds = (self._feed, self._alert, self._radio)
+        threads = [threading.Thread(target=each, args=(bus, stop)) for each in feeds]
         for thread in threads:
             thread.start()
         try:
@@ -128,14 +134,15 @@ class Trial:
     def _wait(self, bus: ZenohBus, recording: Path) -> int:
         """Until a random moment after all have written; how many messages health has told to be stored."""
         health = bus.open_inlet(CP.selector("health", "sa-hub"))
-        before, told = len(self.alerts), 0
+        before, by_radio, told = len(self.alerts), len(self.soldier.acknowledged), 0
 
         def have_written() -> bool:
             nonlocal told
             for envelope in health.take():
                 assert isinstance(envelope.message, Health)
                 told = envelope.message.counters.get("history_taken", 0)
-            return told > 0 and len(self.alerts) > before and _readable(recording) > 0
+            have_alerted = len(self.alerts) > before and len(self.soldier.acknowledged) > by_radio
+            return told > 0 and have_alerted and _readable(recording) > 0
 
         try:
             wait_until(have_written, _PATIENCE_S, "something on the disks")
@@ -164,6 +171,16 @@ class Trial:
                 continue
             self.alerts.append(text)
 
+    def _radio(self, _bus: ZenohBus, stop: threading.Event) -> None:
+        """A soldier alerts over the radio; known is what was acknowledged."""
+        step = 0
+        while not stop.wait(_RADIO_STEP_S):
+            now_ns = time.time_ns()
+            if step % _RADIO_STEPS == 0:
+                self.soldier.alert(f"radio-{self.kills}-{step}", now_ns)
+            self.soldier.step(now_ns)
+            step += 1
+
     def _post(self, path: str, body: Any) -> None:
         request = urllib.request.Request(
             f"http://127.0.0.1:{self.port}/api/v1/{path}",
@@ -173,14 +190,21 @@ class Trial:
         with urllib.request.urlopen(request, timeout=10.0) as answer:
             answer.read()
 
+    def close(self) -> None:
+        """The soldier goes off the air."""
+        self.soldier.close()
+
     def _stored(self) -> int:
+        """Messages in the archive, without those that the soldier, who has no answer yet, will send once more."""
         with closing(Archive(self.url)) as archive:
-            return _count(archive)
+            alerts = [each.message for each in archive.messages("alert", 0, END)]
+            unanswered = {each.text for each in alerts if isinstance(each, Alert) and each.soldier == "a1"}
+            return _count(archive) - len(unanswered - set(self.soldier.acknowledged))
 
     def _check(self, stored: int, told: int, recording: Path, readable: int) -> None:
         with closing(Archive(self.url, create=False)) as archive:
             texts = [getattr(each.message, "text", "") for each in archive.messages("alert", 0, END)]
-            lost = set(self.alerts) - set(texts)
+            lost = {*self.alerts, *self.soldier.acknowledged} - set(texts)
             assert not lost, f"acknowledged and lost: {sorted(lost)}"
             assert len(texts) == len(set(texts)), "an alert is there twice"
             assert _count(archive) >= stored + told, "fewer than health had told"
@@ -228,14 +252,15 @@ def main(
     databases: tuple[Database, ...] = ("sqlite", "postgresql")
     for database in databases:
         with tempfile.TemporaryDirectory() as folder, archive_url(database, Path(folder)) as url:
-            trial = Trial(Path(folder), url, random.Random(seed))
-            for _ in range(kills):
-                trial.kill_once()
+            with closing(Trial(Path(folder), url, random.Random(seed))) as trial:
+                for _ in range(kills):
+                    trial.kill_once()
             rows.append(
                 {
                     "database": database,
                     "kills": trial.kills,
                     "alerts_acknowledged": len(trial.alerts),
+                    "alerts_acknowledged_by_radio": len(trial.soldier.acknowledged),
                     "statuses_stored": trial.statuses,
                     "messages_recorded": trial.recorded,
                 }

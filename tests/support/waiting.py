@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-PATIENCE_S = 45.0  # a condition that comes at all comes long before, on a busy machine too
+PATIENCE_S = 60.0  # a condition that comes at all comes long before, on a busy machine too
 
 
 def wait_until(

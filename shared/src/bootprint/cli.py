@@ -5,8 +5,9 @@ A room adds commands through the entry-point group ``bootprint.commands``; each 
 """
 
 import sys
-from importlib.metadata import entry_points
-from typing import Annotated
+from collections.abc import Iterable, Sequence
+from importlib.metadata import EntryPoint, entry_points
+from typing import Annotated, Final
 
 import typer
 
@@ -15,10 +16,16 @@ from bootprint.errors import BootprintError
 from bootprint.service import EXIT_BAD_INPUT
 
 GROUP = "bootprint.commands"
+_ALONE: Final = frozenset({"bus", "doctor", "fix", "router", "topics", "up", "watch"})
+"""Entries that are one command by their own name, to which no other entry adds anything."""
 
 
-def build_app() -> typer.Typer:
-    """The top-level application with the commands of every installed room."""
+def build_app(words: Sequence[str] = ()) -> typer.Typer:
+    """The top-level application with the commands of every installed room.
+
+    ``words``: what was typed; if the first is a command that stands for itself, nothing else is loaded: a router
+    that is started again need not wait for the proving ground.
+    """
     app = typer.Typer(
         name="bootprint",
         help="Where is everyone, indoors, without GPS, over a radio that carries almost nothing?",
@@ -33,9 +40,15 @@ def build_app() -> typer.Typer:
     ) -> None:
         logs.configure(log_level)
 
-    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
+    for entry in sorted(_entries(words), key=lambda entry: entry.name):
         entry.load()(app)
     return app
+
+
+def _entries(words: Sequence[str]) -> Iterable[EntryPoint]:
+    if words and words[0] in _ALONE:
+        return entry_points(group=GROUP, name=words[0])
+    return entry_points(group=GROUP)
 
 
 def group(app: typer.Typer, name: str, summary: str) -> typer.Typer:
@@ -51,7 +64,7 @@ def group(app: typer.Typer, name: str, summary: str) -> typer.Typer:
 def main() -> None:
     """The console script: one line and exit 2 on anything a person can mend."""
     try:
-        build_app()()
+        build_app(sys.argv[1:])()
     except BootprintError as error:
         sys.stderr.write(f"bootprint: {error}\n")
         sys.exit(EXIT_BAD_INPUT)

@@ -65,6 +65,7 @@ def register(app: typer.Typer) -> None:
     from proving_ground.evaluation.body_benchmark import body
     from proving_ground.evaluation.federation_benchmark import federation
     from proving_ground.evaluation.history_benchmark import history
+    from proving_ground.performance.command import all_parts
 
     group = typer.Typer(no_args_is_help=True, help="What the parts cost, and whether budgets hold.")
     group.command()(foot)
@@ -74,6 +75,7 @@ def register(app: typer.Typer) -> None:
     group.command()(warnings)
     group.command()(history)
     group.command()(federation)
+    group.command("all")(all_parts)
     app.add_typer(group, name="benchmark")
 
 

@@ -25,7 +25,7 @@ from sensor_gateway.recordings.run import ImuSeries
 
 METHODS = ("default", "a7")
 _BATCH = 200
-_EARLY_S = 10.0  # simulated time begins at zero, batches of a stream may not
+EARLY_S = 10.0  # simulated time begins at zero, batches of a stream may not
 CLEAN_S = 600.0
 
 
@@ -45,7 +45,7 @@ def walked(imu: ImuSeries, torso_azimuth: FloatArray, method: str, blind_from_s:
 
 def scored(steps: Sequence[BodyStepEstimate], imu: ImuSeries, torso_azimuth: FloatArray) -> Walked:
     """Steps (`through`) against the torso's azimuths (n,) at the samples."""
-    starts_s, ends_s = np.array([(step.start_ns, step.time_ns) for step in steps]).T * 1e-9 - _EARLY_S
+    starts_s, ends_s = np.array([(step.start_ns, step.time_ns) for step in steps]).T * 1e-9 - EARLY_S
     borders = np.searchsorted(imu.time_s, np.array([starts_s, ends_s]))
     summed = np.concatenate([[0.0], np.cumsum(np.unwrap(torso_azimuth))])
     truth = (summed[borders[1]] - summed[borders[0]]) / np.maximum(borders[1] - borders[0], 1)
@@ -77,7 +77,7 @@ def _navigator(
 
 def through(navigator: BodyNavigator, imu: ImuSeries, blind_from_s: float = np.inf) -> list[BodyStepEstimate]:
     """The steps that a navigator makes of a series."""
-    time_ns = np.round((imu.time_s + _EARLY_S) * 1e9).astype(np.int64)
+    time_ns = np.round((imu.time_s + EARLY_S) * 1e9).astype(np.int64)
     assert imu.mag_ut is not None
     found = []
     for start in range(0, len(time_ns), _BATCH):

@@ -4,6 +4,7 @@ Every step's class against truth, and how far from the start the course ends. Fi
 lengths by class learned on three other walks, the side steps' rotation on the course itself.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -77,21 +78,15 @@ def run_course(name: str, course: str, seed: int, quality: str = "industrial") -
     motion, strides = _walked(person, course, seed, quality)
     classifier, rotation = MovementClassifier(), SideStepRotation()
     place, heading, settlement = np.zeros(2), 0.0, Settlement()
-    truths, at_once, later = [], [], []
+    truths, at_once = [_truth(motion, stride) for stride in strides], list[Direction]()
     for stride in strides:
-        allowed = _truth(motion, stride)
-        if not allowed:
-            continue
         found = classifier.update(stride).direction
-        truths.append(allowed)
         at_once.append(found)
-        later += [classifier.directions.settled(LAG)] if len(truths) > LAG else []
         heading += stride.turn_rad
-        rotation.update(found, heading - 0.5 * stride.turn_rad)
+        rotation.update(found, heading - 0.5 * stride.turn_rad, stride.end_ns * 1e-9)
         ways = {way: length * _towards(stride, rotation, way) for way, length in lengths_m.items()}
         place += settlement.step(ways, classifier.directions)
-    later += at_once[len(later) :]
-    right, settled = (_right(told, truths) for told in (at_once, later))
+    right, settled = (_right(told, truths) for told in (at_once, _settled(strides)))
     rotation_deg = float(np.degrees(rotation.rotation_rad))
     return CourseScore(name, course, len(truths), right, settled, float(np.hypot(*place)), rotation_deg)
 
@@ -131,6 +126,7 @@ def course_table(seeds: range = range(1, 10, 2)) -> str:
 
 
 def _walked(person: Person, course: str, seed: int, quality: str) -> tuple[PersonMotion, list[Stride]]:
+    """The course as it was walked, and the steps on it."""
     legs, place = [], np.zeros(3)
     for gait, ahead, left in COURSES[course]:
         end = place + SIDE_M * np.array([ahead, left, 0.0])
@@ -145,20 +141,26 @@ def _walked(person: Person, course: str, seed: int, quality: str) -> tuple[Perso
         Magnetics(_CENTRAL_EUROPE),
         np.random.default_rng(seed),
     )
-    return motion, cut_strides(imu)
+    return motion, [stride for stride in cut_strides(imu) if _truth(motion, stride)]
 
 
 def _lengths(person: Person, course: str, seeds: Sequence[int], quality: str) -> dict[Direction, float]:
-    """The person's own step lengths by direction, from other walks of known distances."""
-    count = dict.fromkeys(_DIRECTION.values(), 0)
+    """The person's own step lengths by direction, from other walks of known distances: steps as they are told."""
+    count: Counter[Direction] = Counter()
     for seed in seeds:
-        motion, strides = _walked(person, course, seed, quality)
-        middles_s = [0.5e-9 * (stride.start_ns + stride.end_ns) for stride in strides]
-        for activity in motion.activities:
-            if activity.gait in _DIRECTION:
-                within = sum(activity.start_s <= middle_s < activity.end_s for middle_s in middles_s)
-                count[_DIRECTION[activity.gait]] += within
-    return {direction: len(seeds) * SIDE_M / steps for direction, steps in count.items()}
+        _, strides = _walked(person, course, seed, quality)
+        count.update(_settled(strides))
+    return {direction: len(seeds) * SIDE_M / count[direction] for direction in _DIRECTION.values()}
+
+
+def _settled(strides: Sequence[Stride]) -> list[Direction]:
+    """The direction of each step by all that is known `LAG` steps later."""
+    classifier, settled = MovementClassifier(), list[Direction]()
+    for number, stride in enumerate(strides):
+        found = classifier.update(stride).direction
+        settled += [classifier.directions.settled(LAG)] if number >= LAG else []
+    lags = range(min(LAG, len(strides)) - 1, 0, -1)
+    return [*settled, *(classifier.directions.settled(lag) for lag in lags), found]
 
 
 def _truth(motion: PersonMotion, stride: Stride) -> set[Direction]:

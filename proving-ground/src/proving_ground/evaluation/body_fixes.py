@@ -14,7 +14,7 @@ from bootprint.geodesy import LocalFrame
 from pdr_engine.body import BodySettings, BodyStepEstimate
 from pdr_engine.body.pieces import FloatArray
 from proving_ground.evaluation.alignment import Track, fit_rigid, interpolated
-from proving_ground.evaluation.body import BODY, body_track, walk_body
+from proving_ground.evaluation.body import BODY, BodyWalk, body_track, walk_body
 from proving_ground.evaluation.body_pns_gps import filtered
 from proving_ground.evaluation.scoring import score_track
 from proving_ground.sensors.randomness import gauss_markov
@@ -44,9 +44,13 @@ RECEIVERS = (
 )
 
 
-def pns_track(run: Run, settings: BodySettings) -> Track:
-    """The steps of a run without its fixes, and the filter of C4 with them."""
-    steps = walk_body(replace(run, gnss=None), settings).steps
+def pns_walk(run: Run, settings: BodySettings) -> tuple[BodyWalk, Track]:
+    """The steps of a run without its fixes, and the track of C4's filter, which has them."""
+    walk = walk_body(replace(run, gnss=None), settings)
+    return walk, _pns_track(run, walk.steps)
+
+
+def _pns_track(run: Run, steps: Sequence[BodyStepEstimate]) -> Track:
     track = body_track(steps, run.imus[BODY])
     fixes = _fixes(run.gnss) if run.gnss is not None else []
     if not fixes or not steps:
@@ -118,7 +122,7 @@ def phone_table(run: Run) -> str:
     alone = walk_body(replace(run, gnss=None), BodySettings()).steps
     heard = walk_body(run, BodySettings()).steps
     stated = run.gnss.h_acc_m[np.isfinite(run.gnss.h_acc_m)]
-    filter_m = _apart(pns_track(run, BodySettings()), body_track(alone, run.imus[BODY]))
+    filter_m = _apart(pns_walk(run, BodySettings())[1], body_track(alone, run.imus[BODY]))
     return (
         "| fixes | stated accuracy m | steps | walked m | engine with fixes apart from dead reckoning m, most "
         "| C4 filter apart m, most |\n|--:|---|--:|--:|--:|--:|\n"
@@ -154,7 +158,7 @@ def fixes_table(walks: Sequence[Run], phone: Run) -> str:
         engine = np.array(
             [_rmse(run, body_track(walk_body(run, BodySettings()).steps, run.imus[BODY])) for run in fixed]
         )
-        pns = np.array([_rmse(run, pns_track(run, BodySettings())) for run in fixed])
+        pns = np.array([_rmse(run, pns_walk(run, BodySettings())[1]) for run in fixed])
         cells = " | ".join(
             f"{rmse.mean():.2f} | {rmse.max():.2f} | {int((rmse > alone + _WORSE_M).sum())}"
             for rmse in (engine, pns)

@@ -214,12 +214,18 @@ def estimate_foot(imu: ImuSeries, method: str) -> Estimate:
 
 def estimate_body(run: Run, method: str) -> Estimate:
     """The body-worn unit through its navigator, message by message as on the bus."""
-    from pdr_engine.body.methods import settings_of
+    from pdr_engine.body.methods import PNS_GPS, settings_of
     from proving_ground.evaluation.body import body_chain, body_floors, body_track, walk_body
+    from proving_ground.evaluation.body_fixes import pns_walk
 
-    walk, imu = walk_body(run, settings_of(method)), run.imus[BODY]
+    imu, settings = run.imus[BODY], settings_of(method)
+    if method == PNS_GPS:
+        walk, track = pns_walk(run, settings)
+    else:
+        walk = walk_body(run, settings)
+        track = body_track(walk.steps, imu)
     return Estimate(
-        track=body_track(walk.steps, imu),
+        track=track,
         steps=body_chain(walk.steps),
         strides=len(walk.steps),
         samples=len(imu.time_s),

@@ -123,7 +123,15 @@ receivers was chosen, the others were not.
 - **Every position** says which source is left out and why (`rejections`), and how far the truth may be, even if
   something was wrong that no check would notice (`protection_m`).
 - **Speed and course** of a receiver are free of its position's slow errors. Beside what the boots walked between
-  two fixes they tell the heading within metres, and hold it to the door.
+  two fixes they tell the heading within metres, and hold it to the door, but not just after a turn: receivers
+  smooth, and coast on where they lose the sky. Without boots they teach the body's steps length and direction.
+- **Who stands** hears the same reflections again and again: such fixes count as hardly any news.
+- **What nobody measures stays unknown**: feet and a camera hold each other, and that says nothing of what turns
+  them all. A linear filter forgets so, update by update, and becomes sure of a heading that nobody told; here the
+  covariance follows each correction as an invariant filter's does (`fusion.filter`), and what a badly known
+  heading does to a long way beyond the first order is in the published ellipse (`fusion.models.body`).
+- **Facing** (`facing_rad`) is told by the boots that stand, which learn from steps ahead how their sensors sit,
+  else by the body's last step.
 - **Ranges to others of the squad** (`fusion.cooperation`) correct who is less sure than they are. A peer's place
   may stem from the soldier's own, and errs alike from range to range, so it is never averaged in as news: along
   the line between the two the soldier's error becomes the peer's where that is smaller, else nothing happens.

@@ -78,7 +78,7 @@ class _Played(msgspec.Struct, frozen=True):
 
 def measure(sizes: Sequence[int], duration_s: int, turns: int) -> HubFigures:
     """All figures."""
-    rows = tuple(_row(size, duration_s) for size in sizes)
+    rows = hub_rows(sizes, duration_s)
     work, xml_s = _merged(duration_s, turns)
     return HubFigures(
         rows=rows,
@@ -90,6 +90,11 @@ def measure(sizes: Sequence[int], duration_s: int, turns: int) -> HubFigures:
         own_mb_most=max(row.resident_mb for row in rows) - min(row.resident_mb for row in rows),
         resident_mb_most=max(row.resident_mb for row in rows),
     )
+
+
+def hub_rows(sizes: Sequence[int], duration_s: int) -> tuple[HubRow, ...]:
+    """A row for each size of a picture, each of a process of its own."""
+    return tuple(_row(size, duration_s) for size in sizes)
 
 
 def _row(soldiers: int, duration_s: int) -> HubRow:

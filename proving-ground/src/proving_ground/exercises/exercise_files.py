@@ -17,6 +17,7 @@ from sa_hub.keys import create_group_key
 from sa_hub.settings import HubSettings, check_settings
 
 PLAN = "plan.geojson"
+_HISTORY = "history.db"
 _WHERE = "exercise"
 
 
@@ -71,7 +72,13 @@ def _page(exercise: Exercise, computer: str, ports: Ports) -> dict[str, Any]:
     if ports.page is None or computer != exercise.command_post:
         return {}
     plan = {"plan": f"../{PLAN}"} if exercise.site else {}
-    return {"page": {"port": ports.page, **plan}, "history": {}}
+    return {"page": {"port": ports.page, **plan}, "history": {"url": f"sqlite:///state/{_HISTORY}"}}
+
+
+def forget_history(folder: Path) -> None:
+    """Remove the last play's archives, or pages would begin with its places and alerts; counters stay."""
+    for path in folder.glob(f"*/state/{_HISTORY}*"):  # SQLite's -wal and -shm, too
+        path.unlink()
 
 
 def write_gateway(

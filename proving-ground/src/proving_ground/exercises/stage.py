@@ -29,6 +29,7 @@ from proving_ground.exercises.exercise import COMMAND_POST_ROLE, REALM, Exercise
 from proving_ground.exercises.exercise_files import (
     Ports,
     check_exercise,
+    forget_history,
     write_computer,
     write_gateway,
     write_plan,
@@ -114,6 +115,7 @@ class Stage:
         self._start_routers()
         ports = self._start_nets()
         write_realm(self._play.folder, self.exercise)
+        forget_history(self._play.folder)
         if ports.page is not None and self.exercise.site:
             write_plan(self._play.folder, self.exercise)
         for computer in self.exercise.computers:

@@ -11,6 +11,7 @@ from PIL import Image as PngImage
 from scipy.spatial.transform import Rotation
 
 from proving_ground.motion import FloatArray, Motion
+from proving_ground.sensors.camera_defects import Carried, Defects, defective_pair
 from proving_ground.sensors.camera_render import TO_BODY, StereoCamera, render_pair
 from proving_ground.sensors.camera_world import CameraWorld
 from proving_ground.sensors.mounting import Mounting
@@ -24,14 +25,21 @@ def write_camera_folder(
     mounting: Mounting,
     duration_s: float,
     rng: np.random.Generator,
+    defects: Defects | None = None,
 ) -> Path:
-    """Render what a camera on a moving body sees from time zero to ``duration_s``; returns the folder."""
+    """Render what a camera on a moving body sees from time zero to ``duration_s``; returns the folder.
+
+    ``defects``: of the camera, of which ``calib.txt`` knows nothing.
+    """
     for side in ("image_l", "image_r"):
         (folder / side).mkdir(parents=True, exist_ok=True)
     time_s = np.arange(0.0, duration_s, 1.0 / camera.rate_hz)
     place_m, attitude = mounting.carried(motion, time_s)
     for number, when in enumerate(time_s):
-        pair = render_pair(world, camera, float(when), place_m[number], attitude[number], rng)
+        if defects is None:
+            pair = render_pair(world, camera, float(when), place_m[number], attitude[number], rng)
+        else:
+            pair = defective_pair(world, camera, defects, Carried(motion, mounting), float(when), rng)
         for side, image in zip(("image_l", "image_r"), pair, strict=True):
             PngImage.fromarray(image).save(folder / side / f"{number:06d}.png")
     (folder / "calib.txt").write_text(_calibration(camera), encoding="utf-8")

@@ -80,17 +80,27 @@ def _photograph(
     rng: np.random.Generator,
 ) -> Image:
     when, where = np.array([time_s]), eye_m[None]
-    hits = cast(world, when, where, direction[None])
-    grey = _textured(world, camera, hits)[0]
-    range_m = hits.distance[0] * np.linalg.norm(direction, axis=1)
-    clear = np.exp(-float(world.smoke_per_m(when, where)[0]) * np.minimum(range_m, 1e3))
-    grey = clear * grey + (1.0 - clear) * _SMOKE_GREY
-    light = float(world.light(when, where)[0])
-    gain = min(1.0 / max(light, 1e-3), _MOST_GAIN)
-    exposed = gain * (light * grey + rng.normal(0.0, camera.noise_grey, grey.shape))
-    shape = (camera.height_px, camera.width_px)
+    return developed(camera, seen(world, camera, when, where, direction[None]), world.light(when, where), rng)
+
+
+def seen(
+    world: CameraWorld, camera: StereoCamera, time_s: FloatArray, eye_m: FloatArray, direction: FloatArray
+) -> FloatArray:
+    """Grey values in full light (m, r), without noise, along rays (m, r, 3) from eyes (m, 3) at times (m,)."""
+    hits = cast(world, time_s, eye_m, direction)
+    range_m = hits.distance * np.linalg.norm(direction, axis=-1)
+    smoke_per_m = world.smoke_per_m(time_s, eye_m)[:, None]
+    clear = np.exp(-smoke_per_m * np.minimum(range_m, 1e3))
+    return np.asarray(clear * _textured(world, camera, hits) + (1.0 - clear) * _SMOKE_GREY)
+
+
+def developed(camera: StereoCamera, grey: FloatArray, light: FloatArray, rng: np.random.Generator) -> Image:
+    """The image (height, width) of grey values in full light: amplified as far as can be, with its noise."""
+    share = float(light[0])
+    gain = min(1.0 / max(share, 1e-3), _MOST_GAIN)
+    exposed = gain * (share * grey + rng.normal(0.0, camera.noise_grey, grey.shape))
     image: Image = np.clip(np.round(exposed), 0, 255).astype(np.uint8)
-    return image.reshape(shape)
+    return image.reshape(camera.height_px, camera.width_px)
 
 
 def _textured(world: CameraWorld, camera: StereoCamera, hits: Hits) -> FloatArray:
@@ -100,7 +110,8 @@ def _textured(world: CameraWorld, camera: StereoCamera, hits: Hits) -> FloatArra
     # A row for each: who joins the view changes nobody else's look.
     look = rng.uniform([0.0, 0.0, 0.75], [_TEXELS, _TEXELS, 1.15], (count, 3))
     offsets, shades = look[:, :2], look[:, 2]
-    at = offsets[hits.surface] + np.stack([hits.along_m, hits.across_m], axis=-1) / _TEXEL_M
+    place = np.stack([hits.along_m, hits.across_m], axis=-1)
+    at = offsets[hits.surface] + (place if world.tile_m is None else place % world.tile_m) / _TEXEL_M
     footprint = hits.distance / camera.focal_px / _TEXEL_M
     level = np.log2(np.clip(footprint, 1.0, 2.0 ** (_LEVELS - 1))).astype(np.int64)
     noise = _bilinear(_pyramid(world.seed), level, (at + 0.5) / (1 << level)[..., None] - 0.5)

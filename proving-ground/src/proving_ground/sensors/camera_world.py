@@ -57,7 +57,10 @@ class LightZone:
 
 @dataclass(frozen=True)
 class CameraWorld:
-    """Everything in view. ``contrast``: of the textures, 0 blank walls to 1; ``seed`` chooses them."""
+    """Everything in view. ``contrast``: of the textures, 0 blank walls to 1; ``seed`` chooses them.
+
+    ``tile_m``: surfaces repeat the same pattern after so much.
+    """
 
     walls: Walls = field(default_factory=Walls)
     slabs: tuple[Slab, ...] = ()
@@ -65,6 +68,7 @@ class CameraWorld:
     zones: tuple[LightZone, ...] = ()
     contrast: float = 0.6
     seed: int = 0
+    tile_m: float | None = None
 
     @property
     def first_figure(self) -> int:

@@ -2,9 +2,10 @@
 
 A body step has a length and an azimuth. While boots walk, stretches of some metres by boots and by body are laid
 beside each other: that tells the angle at which the unit sits and the person's step length, far better than a belt
-knows them by itself. When no boot has spoken for a moment, the body's steps since then carry the feet along, so
-that nothing jumps; satellites, floors and people go on correcting the same state. While a camera tells the same way
-they do not count. A soldier without boots begins where they are known to be, in the azimuth's own north.
+knows them by itself. Without boots a receiver's Doppler tells the same (`fusion.lessons`). When no boot has spoken
+for a moment, the body's steps since then carry the feet along, so that nothing jumps; satellites, floors and people
+go on correcting the same state. While a camera tells the same way they do not count. A soldier without boots begins
+where they are known to be, in the azimuth's own north.
 
 Azimuth and length err alike from step to step. So the covariance that a walk of ``D`` adds is ``σ_l²·DDᵀ`` along
 and ``σ_α²·D⊥D⊥ᵀ`` across, which grows with the way's square; each step adds what it makes that grow. Corrections
@@ -19,9 +20,10 @@ import numpy as np
 
 from bootprint.clock import NS_PER_S
 from bootprint.geodesy import wrap_angle
-from bootprint.messages import BodyStep, FootStep
+from bootprint.messages import BodyStep, FootStep, GnssFix
 from fusion.boots import Boots
 from fusion.config import BodyConfig
+from fusion.lessons import Lessons
 from fusion.state import Array
 
 _PENDING = 16  # steps that may have been made before silence was noticed
@@ -58,6 +60,7 @@ class BodyTrack:
         self._carried: list[tuple[int, Array]] = []  # what was carried since a foot last spoke
         self._stretch: tuple[Array, Array] | None = None  # where boots were, what the body went since
         self._way = np.zeros(2)  # since the last absolute place, as far as remembered
+        self._lessons = Lessons()
         self._heard_ns: int | None = None
         self._last_sequence = -1
 
@@ -71,16 +74,23 @@ class BodyTrack:
         self._last_sequence = step.sequence
         self._heard_ns = max(self._heard_ns or step.time_ns, step.time_ns)
         self._pending.append(step)
+        taught = list(self._lessons.step(step, _led(step)))
         if not boots.in_enu or boots.reference is None:
             return
         if self._boots_speak(boots, step.time_ns):
             self._learn(boots, step)
             return
         self._stretch = None
+        for angle_rad, ratio in taught:
+            self._hear(angle_rad, ratio)
         if self._camera_speaks(boots, step.time_ns):
             self._pending.clear()  # it tells the same way
             return
         self._carry_pending(boots, also)
+
+    def fix(self, source: str, fix: GnssFix) -> None:
+        """A receiver that is believed has a solution."""
+        self._lessons.fix(source, fix)
 
     def _boots_speak(self, boots: Boots, now_ns: int) -> bool:
         heard_ns = boots.feet_heard_ns
@@ -148,13 +158,12 @@ class BodyTrack:
         across = _QUARTER @ way
         return self._scale.variance * np.outer(way, way) + turn * np.outer(across, across)
 
-    # --- learning from boots -----------------------------------------------------------------------------------
+    # --- learning ----------------------------------------------------------------------------------------------
 
     def _learn(self, boots: Boots, step: BodyStep) -> None:
         """Compare a stretch by boots with the same by body, once it is long and straight."""
         here = np.array(boots.track_point()[:2])
-        yaw = 0.5 * math.pi - step.azimuth_rad
-        went = step.length_m * np.array([math.cos(yaw), math.sin(yaw)])
+        went = _led(step)
         if self._stretch is None:
             self._stretch = here, np.zeros(2)
             return
@@ -164,13 +173,21 @@ class BodyTrack:
         if float(np.hypot(*by_body)) < self._config.stretch_m:
             return
         self._stretch = None
-        ratio = float(np.hypot(*by_boots) / np.hypot(*by_body))
+        angle_rad = math.atan2(by_boots[1], by_boots[0]) - math.atan2(by_body[1], by_body[0])
+        self._hear(angle_rad, float(np.hypot(*by_boots) / np.hypot(*by_body)))
+
+    def _hear(self, angle_rad: float, ratio: float) -> None:
+        """How far the unit was turned, and how much longer its steps should have been, over a stretch."""
         if 0.5 < ratio < 2.0:
-            angle = math.atan2(by_boots[1], by_boots[0]) - math.atan2(by_body[1], by_body[0])
-            self._turn.hear(wrap_angle(angle - self._turn.value))
+            self._turn.hear(wrap_angle(angle_rad - self._turn.value))
             self._scale.hear(ratio - self._scale.value)
 
     # --- what is asked -----------------------------------------------------------------------------------------
+
+    @property
+    def turned(self) -> tuple[float, float]:
+        """The angle, counter-clockwise, from the unit's yaws to the boots', and its sigma, rad."""
+        return self._turn.value, math.sqrt(self._turn.variance)
 
     def drives(self, boots: Boots, now_ns: int) -> bool:
         """Whether the position moves by the body's steps alone."""
@@ -181,6 +198,11 @@ class BodyTrack:
             and not self._camera_speaks(boots, now_ns)
             and now_ns - self._heard_ns <= self._config.fresh_s * NS_PER_S
         )
+
+
+def _led(step: BodyStep) -> Array:
+    """Where a step led by itself, (2,) m, east and north."""
+    return step.length_m * np.array([math.sin(step.azimuth_rad), math.cos(step.azimuth_rad)])
 
 
 def _positive(matrix: Array) -> Array:

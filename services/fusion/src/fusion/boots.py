@@ -304,6 +304,12 @@ class Boots(Company):
             return np.zeros(3)
         return sum((foot.at(now_ns) for foot in alive), np.zeros(3)) / len(alive) + self.ahead(alive, now_ns)
 
+    def spread_of(self, alive: Sequence[Foot]) -> Array:
+        """Covariance (3, 3) of the body's position over these, in the filter's frame, m²."""
+        stands = [(foot.block, foot.offset) for foot in alive]
+        spread = body.position_covariance(self.filter.state, self.filter.covariance, stands)
+        return spread + self._config.boots.pose_sigma_m**2 * np.eye(3)
+
     def track_point(self) -> Vector3:
         """Where the walk has come to: the reference foot's position."""
         foot = self.reference

@@ -152,12 +152,17 @@ class Camera:
         )
 
     def _noise(self, step: CameraStep) -> Array:
-        """The step's covariance, and what steps have in common: scale, tilt, drift of heading."""
+        """The step's covariance, and what steps have in common: scale, tilt, drift of heading.
+
+        Scale and tilt err alike in all steps of a stretch, so that the error of its end grows with its length:
+        independent steps add up to as much by the end of it with the variance ``σ²·length·stretch``.
+        """
         settings = self._settings
         length_m = math.hypot(*step.displacement_m)
+        alike_m = math.sqrt(length_m * max(length_m, settings.stretch_m))
         slope = math.hypot(settings.scale_sigma, self._tilt.sigma_rad)
         turn = settings.heading_walk_rad_sqrt_s**2 * (step.time_ns - step.start_ns) / NS_PER_S
-        shared = np.array([settings.scale_sigma, settings.scale_sigma, slope]) * length_m
+        shared = np.array([settings.scale_sigma, settings.scale_sigma, slope]) * alike_m
         return np.asarray(step.covariance + np.diag([*shared**2, turn]))
 
     def _note(self, foot: Foot, step: FootStep) -> None:
@@ -263,8 +268,17 @@ class Camera:
         across, up = settings.same_position_sigma_m**2, settings.offset_sigma_m**2
         noise = np.diag([across, across, up])
         gate = self._config.boots.gate_probability
+        repeated = noise * max(1.0, 2.0 * settings.repeats)
         innovation = self._boots.correct(
-            Measurement("camera", residual, jacobian, noise, gate_probability=gate)
+            Measurement(
+                "camera",
+                residual,
+                jacobian,
+                repeated,
+                gate_noise=noise,
+                gate_probability=gate,
+                relative=True,
+            )
         )
         if not innovation.accepted:
             self._counters["camera_apart"] += 1

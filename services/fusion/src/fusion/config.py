@@ -65,6 +65,10 @@ class GnssConfig(Config, frozen=True):
     accuracy_floor_m: Positive = 1.0  # the antenna is on the shoulder, the state at the feet
     vertical_floor_m: Positive = 2.0  # covers the antenna's height as well
     correlation_s: NonNegative = 30.0  # a receiver's error lives about this long (multipath, ionosphere)
+    standing_correlation_s: Positive = (
+        300.0  # ... where it stands: what walls reflect changes with the sky only
+    )
+    reflection_m: Positive = 6.0  # or with the place, over this far
     fresh_s: Positive = 5.0  # mode "gnss" for this long after an accepted fix
     placement_accuracy_m: Positive = 15.0  # only fixes this good may place a soldier
     placement_heading_sigma_deg: Positive = 8.0  # heading is known when the fit of tracks is this sure
@@ -79,6 +83,7 @@ class VelocityConfig(Config, frozen=True):
     """How a receiver's speed and course are believed (``[fusion.velocity]``)."""
 
     sigma_m_s: Positive = 0.15  # each axis of one fix: Doppler is better, shoulders sway
+    clear_accuracy_m: Positive = 3.0  # of a position under open sky: worse ones have worse velocities
     repeats: Positive = 2.0  # sway and turns err alike over so many fixes
     fewest: Annotated[int, msgspec.Meta(ge=2)] = 4  # ways before a heading is told
     lasting_rad: NonNegative = 0.02  # that no number of ways mends
@@ -175,6 +180,8 @@ class CameraConfig(Config, frozen=True):
     same_position_sigma_m: Positive = 0.3  # METHODS D6: 0.1 to 1 m; feet stride, a head sways
     offset_sigma_m: Positive = 0.2  # of the constant vertical offset
     couple_s: NonNegative = 1.0  # once in so long: sway and stride repeat within it
+    repeats: NonNegative = 5.0  # lean, and who kneels, repeat over so many couplings
+    stretch_m: NonNegative = 10.0  # of way, over which scale and tilt err alike
     scale_sigma: NonNegative = 0.01  # of a motion's length: calibration errs alike in all of them
     heading_walk_rad_sqrt_s: NonNegative = 0.0003
     join_sigma_m: Positive = (

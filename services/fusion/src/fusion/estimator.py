@@ -34,9 +34,9 @@ from fusion.carriers import Carriers
 from fusion.coasting import Coasting
 from fusion.config import FusionConfig
 from fusion.cooperation import Cooperation
+from fusion.facing import Facing
 from fusion.feet import Foot
 from fusion.heights import Heights
-from fusion.models import body
 from fusion.output import Estimate
 from fusion.placement import HeadingHint, Place, Placement, known_point
 from fusion.protection import Protection, Protector
@@ -62,6 +62,7 @@ class Estimator:
         self._body = BodyTrack(config.body, counters)
         self._camera = Camera(self.boots, config, counters)
         self.sight = self._camera.sight  # what its newest motion told of its surroundings
+        self._facing = Facing()
         self._coasting = Coasting(config.silence)
         self._carriers = Carriers(config.silence, self.satellites, self._body)
         self._heights = Heights(config, self._aid.shadows, counters)
@@ -106,6 +107,7 @@ class Estimator:
         self._camera.take_back(place, step)
         dropped = self._counters["feet_dropped"]
         foot = self.boots.step(place, step)
+        self._facing.step(place, step)
         self._aid.step(place, step)
         if self._counters["feet_dropped"] > dropped:
             self._aid.forget()  # a foot that has gone astray has led shadows astray, whom no satellite held
@@ -156,6 +158,7 @@ class Estimator:
             self._start, self._without_boots = None, True
             self._try_placing()
         self._body.step(self.boots, self._aid.boots, step)
+        self._facing.body_step(step, self._body.turned)
 
     def pressure(self, pressure: Pressure) -> None:
         """A barometer has measured."""
@@ -176,6 +179,7 @@ class Estimator:
             position = self.satellites.late(position, xyz(moved) if self.placed else (0.0, 0.0, 0.0), late_s)
         elif self._aid.believes(source):
             self.placement.course = self._courses.hear(self.boots, source, fix)
+            self._body.fix(source, fix)
         if self.placed:
             self._correct_by(position)
         elif position.sigma_m > self._config.gnss.placement_accuracy_m:
@@ -241,7 +245,7 @@ class Estimator:
         self._aid.forget()
         self._body.placed()
         self._protector.know(place.enu)
-        told.believe(self.boots, place, self._covariance(self.boots.alive(place.time_ns)))
+        told.believe(self.boots, place, self.boots.spread_of(self.boots.alive(place.time_ns)))
 
     def _correct_by(self, position: SatellitePosition) -> None:
         self._coasting.own_up(self.boots, position.time_ns)
@@ -295,6 +299,7 @@ class Estimator:
             velocity=velocity,
             speed_m_s=speed,
             course_sigma_rad=course_sigma,
+            facing=self._facing.at(self.boots, now_ns, turn),
             protection=self._protection(now_ns, enu, covariance) if self.placed else None,
         )
 
@@ -326,14 +331,14 @@ class Estimator:
         """Place, covariance (3, 3), and the turn (yaw, σ) of the filter's directions into ENU; None if unplaced."""
         local = self.boots.place_at(now_ns, alive)
         if self.placed:
-            return xyz(local), self._covariance(alive), (0.0, 0.0)
+            return xyz(local), self.boots.spread_of(alive), (0.0, 0.0)
         move = self.placement.provisional if alive else None
         if move is not None:
             jacobian = move.error_jacobian(xyz(local))[:3]
-            spread = move.rotation() @ self._covariance(alive) @ move.rotation().T
+            spread = move.rotation() @ self.boots.spread_of(alive) @ move.rotation().T
             covariance = spread + jacobian @ move.covariance @ jacobian.T
             return xyz(move.point(xyz(local))), covariance, (move.yaw_rad, math.sqrt(move.covariance[3, 3]))
-        around = self.placement.around(xyz(local), self._covariance(alive) if alive else np.zeros((3, 3)))
+        around = self.placement.around(xyz(local), self.boots.spread_of(alive) if alive else np.zeros((3, 3)))
         if around is None:
             return None
         place, enu, covariance = around
@@ -341,9 +346,3 @@ class Estimator:
             drift_m = self._config.silence.drift_m_s * max(0.0, (now_ns - place.time_ns) / NS_PER_S)
             covariance = covariance + drift_m**2 * np.diag([1.0, 1.0, 0.0])
         return enu, covariance, None
-
-    def _covariance(self, alive: list[Foot]) -> Array:
-        """Covariance (3, 3) of the body's position in the filter's frame, m²."""
-        known, stands = self.boots.filter, [(foot.block, foot.offset) for foot in alive]
-        spread = body.position_covariance(known.state, known.covariance, stands)
-        return spread + self._config.boots.pose_sigma_m**2 * np.eye(3)

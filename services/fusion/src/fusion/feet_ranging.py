@@ -45,6 +45,7 @@ def hold_feet(boots: Boots, message: Range, config: FusionConfig, counters: Coun
             _REPEATS * noise,
             gate_noise=noise,
             gate_probability=config.boots.gate_probability,
+            relative=True,
         )
     )
     counters["feet_ranges" if found.accepted else "feet_ranges_refused"] += 1

@@ -42,8 +42,7 @@ class Measurement:
     what was replaced, so nothing counts twice. (Covariance intersection along the measured directions, whose
     optimum between two scalars is the surer of them: Julier and Uhlmann 1997.)
 
-    ``relative``: of those who walk against each other only. It knows no north, so what it corrects is as much
-    turned as they are.
+    ``relative``: it compares walkers with each other, and would be the same had all been turned and moved together.
     """
 
     source: str
@@ -155,10 +154,7 @@ class StateFilter:
         """Gate, then update; the innovation tells what happened."""
         innovation = self._innovation(measurement)
         if innovation.accepted:
-            before = self.state
             self._correct(measurement)
-            if measurement.relative:
-                self._turn_along(self.state - before)
             self._settle()
         return innovation
 
@@ -168,20 +164,24 @@ class StateFilter:
         shared = self.covariance @ jacobian.T
         gain = shared @ invert_spd(jacobian @ shared + (0.0 if measurement.entangled else 1.0) * noise)
         kept = np.eye(self.layout.size) - gain @ jacobian
-        self.state = self.state + gain @ measurement.residual
+        correction = gain @ measurement.residual
+        self.state = self.state + correction
         self.covariance = kept @ self.covariance @ kept.T + gain @ noise @ gain.T
+        if measurement.relative:
+            self._turn_along(correction)
 
-    def _turn_along(self, moved: Array) -> None:
-        """What has been ``moved`` (n,) by how feet stand to each other is turned by as much as their yaw is.
+    def _turn_along(self, correction: Array) -> None:
+        """What nobody has measured stays as unknown as it was, though positions have been corrected.
 
-        The correction was found in their axes and is told in the map's. Without its share of the yaw's error the
-        next one would be compared with a geometry that is turned otherwise, and the filter would find itself ever
-        surer of a north that nobody has seen (Huang, Mourikis and Roumeliotis 2010; an invariant error has it built
-        in: Barrau and Bonnabel 2017).
+        A turn of everything moves a walker at p by ``J p``. Measurements between walkers cannot tell it; but once
+        they have moved p, the covariance holds the turn about where p was, and the next one, linearised at p now,
+        would take the difference for news: by a thousand of them a heading that nobody knows becomes sure (Huang,
+        Mourikis and Roumeliotis 2010). So position errors follow, as those of an invariant filter do (Barrau and
+        Bonnabel 2017): ``δp ← δp + J Δp δψ``.
         """
         turning = np.eye(self.layout.size)
         for block in self.layout.walkers:
-            east, north, _ = moved[block.position]
+            east, north, _ = correction[block.position]
             turning[block.position, block.yaw] = (-north, east, 0.0)
         self._advance(self.state, turning, np.zeros_like(self.covariance))
 

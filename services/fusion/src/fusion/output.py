@@ -18,7 +18,10 @@ _LEAVES_FLOOR = 0.6  # storeys from the last floor, for another one
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """The fused answer at one moment: ENU m, covariance (3, 3) m², velocity m/s; ``course_sigma_rad`` if known."""
+    """The fused answer at one moment: ENU m, covariance (3, 3) m², velocity m/s; ``course_sigma_rad`` if known.
+
+    ``facing``: azimuth of the body and its sigma, rad.
+    """
 
     mode: Mode
     enu: Vector3
@@ -26,6 +29,7 @@ class Estimate:
     velocity: Vector3 = (0.0, 0.0, 0.0)
     speed_m_s: float = 0.0
     course_sigma_rad: float | None = None
+    facing: tuple[float, float] | None = None
     motion: MotionClass = "unknown"
     sources: tuple[str, ...] = ()
     rejections: dict[str, str] = field(default_factory=dict)
@@ -61,6 +65,8 @@ class Publisher:
             speed_m_s=estimate.speed_m_s,
             course_rad=course,
             course_sigma_rad=course_sigma,
+            facing_rad=None if estimate.facing is None else estimate.facing[0],
+            facing_sigma_rad=None if estimate.facing is None else estimate.facing[1],
             floor=self._floor_of(estimate),
             motion=estimate.motion,
             sources=estimate.sources,

@@ -71,7 +71,7 @@ class SatelliteAid:
             return boots
         if receiver.is_settled(position.time_ns, self._trust.retrust_s):
             self.shadows.split_off(boots, self._counters, position.time_ns)
-        self._update(boots, position)
+        self._update(boots, position, receiver)
         return boots
 
     def _as_seen(self, boots: Boots, position: SatellitePosition, receiver: Receiver) -> SatellitePosition:
@@ -122,16 +122,21 @@ class SatelliteAid:
             away, _ = residual(boots, enu, position.time_ns)  # dead reckoning was wrong by this much
             boots.filter.widen_together(np.diag([*(away**2), 0.0]))
 
-    def _update(self, boots: Boots, position: SatellitePosition) -> None:
-        innovation = self._correct_axes(boots, position, slice(0, 2), gnss.noise(position.sigma_m, None))
+    def _update(self, boots: Boots, position: SatellitePosition, receiver: Receiver) -> None:
+        here = body.position(boots.filter.state, boots.stands(position.time_ns))[:2]
+        inflation = gnss.correlation_inflation(position.since_s, receiver.moved_m(here), self._gnss)
+        noise = gnss.noise(position.sigma_m, None)
+        innovation = self._correct_axes(boots, position, slice(0, 2), noise, inflation)
         self._satellites.judge(position, innovation)
+        if innovation.accepted:
+            receiver.heard_at = here
         if innovation.accepted and position.up_sigma_m is not None:
-            lasting = replace(position, inflation=_HEIGHT_LASTS * position.inflation)
-            height = self._correct_axes(boots, lasting, slice(2, 3), np.array([[position.up_sigma_m**2]]))
+            noise = np.array([[position.up_sigma_m**2]])
+            height = self._correct_axes(boots, position, slice(2, 3), noise, _HEIGHT_LASTS * inflation)
             self._counters["gnss_height_rejected"] += not height.accepted
 
     def _correct_axes(
-        self, boots: Boots, position: SatellitePosition, axes: slice, noise: Array
+        self, boots: Boots, position: SatellitePosition, axes: slice, noise: Array, inflation: float
     ) -> Innovation:
         stands = boots.stands(position.time_ns)
         state = boots.filter.state
@@ -140,7 +145,7 @@ class SatelliteAid:
                 "gnss",
                 (np.array(position.enu) - body.position(state, stands))[axes],
                 body.position_jacobian(state, stands)[axes],
-                noise * position.inflation,
+                noise * inflation,
                 gate_noise=noise,
                 gate_probability=self._gnss.gate_probability,
             )

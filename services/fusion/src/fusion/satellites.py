@@ -19,14 +19,14 @@ _JUDGED = 10  # fixes, for whether a receiver's stamps are of use
 
 @dataclass(frozen=True, slots=True)
 class SatellitePosition:
-    """A fix as a place in ENU, one sigma per axis in m; ``inflation`` of its variance for repeating itself."""
+    """A fix as a place in ENU, one sigma per axis in m; ``since_s``: its receiver's last accepted one."""
 
     time_ns: int
     source: str
     enu: Vector3
     sigma_m: float
     up_sigma_m: float | None
-    inflation: float
+    since_s: float
 
 
 @dataclass
@@ -57,7 +57,7 @@ class Satellites:
         if not self.is_in_range(enu):
             return self._refused("gnss_out_of_range")
         up_sigma_m = gnss.vertical_sigma_m(fix, self.config)
-        return SatellitePosition(fix.time_ns, source, enu, sigma_m, up_sigma_m, self._inflation(source, fix))
+        return SatellitePosition(fix.time_ns, source, enu, sigma_m, up_sigma_m, self._since_s(source, fix))
 
     def is_in_range(self, enu: Vector3) -> bool:
         """Whether a place is near enough to the realm's origin to be meant."""
@@ -90,11 +90,9 @@ class Satellites:
         self.counters[why] += 1
         return None
 
-    def _inflation(self, source: str, fix: GnssFix) -> float:
+    def _since_s(self, source: str, fix: GnssFix) -> float:
         last_ns = self.accepted_ns.get(source)
-        if last_ns is None:
-            return 1.0
-        return gnss.correlation_inflation((fix.time_ns - last_ns) / NS_PER_S, self.config.correlation_s)
+        return math.inf if last_ns is None else (fix.time_ns - last_ns) / NS_PER_S
 
     def placed_by(self, position: SatellitePosition) -> None:
         """The fix was used to place an unplaced soldier."""

@@ -54,6 +54,7 @@ class Receiver:
     agreeing_ns: int | None = None  # since when all fixes of a distrusted one have agreed
     astray: deque[tuple[int, bool]] = field(default_factory=deque)
     misses: deque[tuple[int, Array]] = field(default_factory=deque)
+    heard_at: Array | None = None  # (2,) m, where the newest accepted fix was, by the boots
 
     def scatter_m(self, miss: Array, time_ns: int, window_s: float) -> float:
         """Standard deviation of a fix's axes about a straight line through those of the window, m."""
@@ -65,6 +66,10 @@ class Receiver:
         design = np.column_stack([np.ones(len(times)), times])
         fitted = design @ np.linalg.lstsq(design, values, rcond=None)[0]
         return float(np.sqrt(np.sum((values - fitted) ** 2) / (2.0 * (len(times) - 2))))
+
+    def moved_m(self, here: Array) -> float:
+        """How far the boots have gone since the newest accepted fix; to ``here`` (2,)."""
+        return math.inf if self.heard_at is None else float(np.hypot(*(here - self.heard_at)))
 
     def strays(self, astray: bool, time_ns: int, window_s: float) -> bool:
         """Whether most of the last fixes, over all of the window, were astray."""

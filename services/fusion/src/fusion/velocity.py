@@ -19,10 +19,13 @@ from fusion.config import VelocityConfig
 from fusion.filter import Measurement
 from fusion.state import Array
 
-_LONGEST_S = 2.5  # between two fixes whose mean velocity stands for the way between
+LONGEST_S = 2.5  # between two fixes whose mean velocity stands for the way between
 _LEAST_SPEED_M_S = 0.5  # a course of less is noise
 _LEAST_WAY_M = 0.5
 _SLOPPY_M = 0.1  # of a way by boots: sway, and poses a tenth of a second apart
+_LAGGING_RAD = (
+    0.35  # a receiver smooths, or coasts on: where boots have turned by more its course is of before
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +45,7 @@ class Courses:
     counters: Counter[str]
     _last: dict[str, tuple[int, Array]] = field(default_factory=dict)  # time and velocity, by receiver
     _fits: dict[str, "CourseFit"] = field(default_factory=dict)
+    _walked: dict[str, Array] = field(default_factory=dict)  # the way before, (2,) m, by receiver
 
     def hear(self, boots: Boots, source: str, fix: GnssFix) -> tuple[float, float] | None:
         """Hold the heading of boots in ENU; of others the turn into ENU and its sigma, once it is known, rad."""
@@ -67,11 +71,24 @@ class Courses:
             return None
         self._last[source] = fix.time_ns, velocity
         lasted_s = 0.0 if last is None else (fix.time_ns - last[0]) / NS_PER_S
-        if last is None or not 0.0 < lasted_s <= _LONGEST_S:
+        if last is None or not 0.0 < lasted_s <= LONGEST_S:
             return None
-        walked = boots.place_at(fix.time_ns, alive) - boots.place_at(last[0], alive)
-        sigma_m_s = max(fix.speed_accuracy_m_s or 0.0, self.config.sigma_m_s)
-        return Way(0.5 * lasted_s * (velocity + last[1]), walked[:2], sigma_m_s * lasted_s)
+        walked = (boots.place_at(fix.time_ns, alive) - boots.place_at(last[0], alive))[:2]
+        before = self._walked.get(source)
+        self._walked[source] = walked
+        if before is None or _between(before, walked) > _LAGGING_RAD:
+            return None
+        return Way(0.5 * lasted_s * (velocity + last[1]), walked, self._sigma_m_s(fix) * lasted_s)
+
+    def _sigma_m_s(self, fix: GnssFix) -> float:
+        """Few satellites, low ones: what spoils a position spoils the velocity as much."""
+        spoilt = (fix.horizontal_accuracy_m or 0.0) / self.config.clear_accuracy_m
+        return max(fix.speed_accuracy_m_s or 0.0, self.config.sigma_m_s * max(1.0, spoilt))
+
+
+def _between(one: Array, other: Array) -> float:
+    """The angle between two ways, rad."""
+    return abs(math.atan2(one[0] * other[1] - one[1] * other[0], float(one @ other)))
 
 
 def velocity_m_s(fix: GnssFix) -> Array | None:

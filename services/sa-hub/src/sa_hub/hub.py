@@ -5,8 +5,8 @@ a grid of 0.1 s of event time. Steps that were missed are made up (the last 10 s
 their time, so decisions do not depend on how often `tick` is called.
 """
 
-from collections import Counter, OrderedDict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -16,19 +16,20 @@ from bootprint.awareness import Aim
 from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.config import Member, Realm
-from bootprint.display import Ages
 from bootprint.figures import Figures
 from bootprint.messages import HARMLESS_CODES, Alert, Fix, Message, Observation, Position, Status
 from bootprint.topics import Identity
+from sa_hub.accounts import figures_of
 from sa_hub.awareness.watch import Watch
 from sa_hub.motion import Motion
 from sa_hub.own_reports import OwnReports
 from sa_hub.publishing import Publisher
 from sa_hub.radio.content import MAX_HOPS, Condition, Notice, Report, Reports, StatusNotice, one_hop_on
 from sa_hub.radio.net import RadioNet
-from sa_hub.radio.outbox import Key, key_of
+from sa_hub.radio.outbox import CAPACITY
 from sa_hub.radio.replay import Memory
 from sa_hub.retelling import Retelling
+from sa_hub.seen import Seen
 from sa_hub.settings import HubSettings
 from sa_hub.tracks import CLOCK_SET_BACK_NS, Known, SenderClock, Tracks
 from sa_hub.translate import notice_of, report_of_fix, report_of_position
@@ -36,7 +37,6 @@ from sa_hub.translate import notice_of, report_of_fix, report_of_position
 STEP_NS: Final = 100_000_000
 STEPS_PER_S: Final = NS_PER_S // STEP_NS
 MOST_STEPS_MADE_UP: Final = 10 * STEPS_PER_S
-_REMEMBERED_NOTICES: Final = 512
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,14 +60,13 @@ class HubCore:
         self._ids = {number: each.id for number, each in self._roster.items()}
         self._publisher = Publisher(Identity(realm.id, member.unit, member.id), self._roster)
         self._nets = dict(nets)
-        own_ages, ages = _ages(settings)
-        self._tracks = Tracks(member.number, own_ages, ages)
-        self._watch = Watch(member, self._roster, settings.warnings, ages.stale_ns)
+        self._tracks = Tracks(member.number, settings.own_ages, settings.ages)
+        self._watch = Watch(member, self._roster, settings.warnings, settings.ages.stale_ns)
         self._conditions: dict[int, Condition] = {}
         self._clocks: dict[int, SenderClock] = {}
-        self._motion = Motion()
         self._motions: dict[int, Motion] = {}
-        self._seen: OrderedDict[Key, None] = OrderedDict()
+        self._seen = Seen()
+        self._unposted: deque[Notice] = deque(maxlen=CAPACITY)
         self._placed: Report | None = None
         self._own = OwnReports()
         self._retelling = Retelling(self._tracks, member.number, relays=settings.relays)
@@ -87,7 +86,7 @@ class HubCore:
             case Position():
                 self._placed = None
                 self._watch.lines.position(message, self._now_ns)
-                return self._own_report(self._report_of(message))
+                return self._own_report(self._report_of(message, self._member.number))
             case Fix():
                 return self._place(message)
             case Aim():
@@ -102,8 +101,7 @@ class HubCore:
 
     def take_in(self, position: Position, number: int) -> list[Envelope]:
         """Another soldier's fused position that came whole, by a way without frames: for a relay to tell on."""
-        velocity = self._motions.setdefault(number, Motion()).update(position)
-        report = report_of_position(position, number, velocity, self._conditions.get(number, "ok"))
+        report = self._report_of(position, number)
         known = self._tracks.update(report, max(self._now_ns, report.time_ns), "bus")
         if known is None:
             self.counters["positions_out_of_order"] += 1
@@ -149,6 +147,11 @@ class HubCore:
         """Whether a link can take a frame now; until it can, its net keeps back what is due."""
         self._nets[link].hold(busy=busy)
 
+    def kept(self, until: int | None, look: int) -> None:
+        """Only what was received in looks up to ``until`` is to be acknowledged (None: all); ``look`` begins."""
+        for net in self._nets.values():
+            net.correspondence.kept_until, net.correspondence.look = until, look
+
     def memory(self, link: str) -> Memory:
         """What was heard on a link, for keeping over a restart."""
         return self._nets[link].opener.memory
@@ -159,25 +162,7 @@ class HubCore:
 
     def figures(self) -> Figures:
         """Counts of what was refused and why, over all links, and how many tracks are in which state."""
-        counters = Counter(self.counters)
-        for net in self._nets.values():
-            counters.update({f"radio_{cause}": count for cause, count in net.meter.rejected.items()})
-            counters["reports_unresolved"] += net.unresolved
-            counters["notices_dropped"] += net.correspondence.outbox.dropped
-            counters["notices_unacknowledged"] += net.correspondence.outbox.given_up
-            counters["radio_counter_faults"] += net.counter_faults
-            counters["radio_faults"] += net.faults
-        states = Counter(known.state for known in self._tracks.all())
-        gauges = {f"tracks_{state}": float(states[state]) for state in ("fresh", "stale", "lost")}
-        note = _note(counters) or self._unopened_nets()
-        return Figures("degraded" if note else "ok", dict(counters), gauges, note)
-
-    def _unopened_nets(self) -> str:
-        """Nets on which frames are heard of which none can be opened."""
-        deaf = [name for name, net in self._nets.items() if net.opens_nothing]
-        return (
-            f"hears frames on {', '.join(deaf)} but can open none: is the group key the same?" if deaf else ""
-        )
+        return figures_of(self.counters, self._nets, self._tracks)
 
     # -- time -------------------------------------------------------------------------------------------------
 
@@ -186,6 +171,7 @@ class HubCore:
         if now_ns < self._now_ns - CLOCK_SET_BACK_NS:
             self._set_back(self._now_ns - now_ns)
         self._now_ns = max(self._now_ns, now_ns)
+        self._post_own()
         self._own.settle(self._now_ns)
         self._tracks.own_arrived(self._now_ns)
 
@@ -225,9 +211,9 @@ class HubCore:
     def _condition(self) -> Condition:
         return self._conditions.get(self._member.number, "ok")
 
-    def _report_of(self, position: Position) -> Report:
-        velocity = self._motion.update(position)
-        return report_of_position(position, self._member.number, velocity, self._condition)
+    def _report_of(self, position: Position, number: int) -> Report:
+        velocity = self._motions.setdefault(number, Motion()).update(position)
+        return report_of_position(position, number, velocity, self._conditions.get(number, "ok"))
 
     def _place(self, fix: Fix) -> list[Envelope]:
         """A command post stands where a person put it; a soldier's fix is for the fusion to go on from."""
@@ -248,11 +234,18 @@ class HubCore:
         notice = notice_of(message, self._member.number)
         if isinstance(notice, StatusNotice):
             self._conditions[notice.number] = notice.condition
-        if self._is_new(notice):
+        if self._seen.is_new(notice):
             self._note_target(message)
+            self._unposted.append(notice)
+            self._post_own()
+        return []
+
+    def _post_own(self) -> None:
+        """What came before the first tick waits for it: the message's own time may be ahead of the hub's."""
+        while self._now_ns and self._unposted:
+            notice = self._unposted.popleft()
             for net in self._nets.values():
                 net.post(notice, self._now_ns)
-        return []
 
     # -- what was heard ---------------------------------------------------------------------------------------
 
@@ -297,7 +290,7 @@ class HubCore:
         if notice.number not in self._roster:
             self.counters["unknown_soldiers"] += 1
             return []
-        if notice.number == self._member.number or not self._is_new(notice):
+        if notice.number == self._member.number or not self._seen.is_new(notice):
             return []
         if isinstance(notice, StatusNotice):
             self._conditions[notice.number] = notice.condition
@@ -307,20 +300,10 @@ class HubCore:
                     net.post(one_hop_on(notice), self._now_ns)
         return [self._notice(notice)]
 
-    def _is_new(self, notice: Notice) -> bool:
-        """Whether this event was not seen before; repeats and copies over other ways are not new."""
-        key = key_of(notice)
-        if key in self._seen:
-            return False
-        self._seen[key] = None
-        if len(self._seen) > _REMEMBERED_NOTICES:
-            self._seen.popitem(last=False)
-        return True
-
     # -- what is told -----------------------------------------------------------------------------------------
 
     def _speak(self, step_ns: int) -> None:
-        candidates = self._candidates(step_ns)
+        candidates = self._retelling.candidates(self._own_now(step_ns))
         for name, net in self._nets.items():
             self._retelling.see_to(name, net, step_ns)
             try:
@@ -332,23 +315,10 @@ class HubCore:
                 continue
             self._frames += [OutgoingFrame(name, data) for data in frames]
 
-    def _candidates(self, step_ns: int) -> list[Report]:
-        """Our own report and, from a relay, others' that it may pass on; by number."""
-        own_known = self._tracks.get(self._member.number)
-        own = None
-        if own_known is not None and own_known.state != "lost":
-            own = self._own.at(step_ns, self._now_ns)
-        candidates = [] if own is None else [own]
-        if self._settings.relays:
-            candidates += self._to_pass_on()
-        return sorted(candidates, key=lambda report: report.number)
-
-    def _to_pass_on(self) -> Iterator[Report]:
-        """Others' reports that are not lost and may pass another relay."""
-        for known in self._tracks.all():
-            passable = known.state != "lost" and known.report.hops < MAX_HOPS
-            if passable and known.report.number != self._member.number:
-                yield known.passed_on
+    def _own_now(self, step_ns: int) -> Report | None:
+        """Our own report for this step, unless we are lost ourselves."""
+        known = self._tracks.get(self._member.number)
+        return None if known is None or known.state == "lost" else self._own.at(step_ns, self._now_ns)
 
     def _each_second(self, second_ns: int) -> Iterable[Envelope]:
         """Link reports, and a command post that still stands where it was put."""
@@ -376,16 +346,3 @@ class HubCore:
         self._watch.lines.target(message, self._now_ns)
         for net in self._nets.values():
             net.scheduler.relevance.saw(self._now_ns, message.latitude_deg, message.longitude_deg)
-
-
-def _note(counters: Mapping[str, int]) -> str:
-    """What is wrong, if anything is."""
-    if counters["radio_counter_faults"]:
-        return "no fresh radio counters can be reserved: not sending"
-    return "a radio net cannot speak, see the log" if counters["radio_faults"] else ""
-
-
-def _ages(settings: HubSettings) -> tuple[Ages, Ages]:
-    lost_ns = round(settings.lost_s * NS_PER_S)
-    own = Ages(round(settings.own_stale_s * NS_PER_S), lost_ns)
-    return own, Ages(round(settings.stale_s * NS_PER_S), lost_ns)

@@ -17,7 +17,9 @@ from bootprint.messages import Fix, Track
 from bootprint.rooms import RoomMap
 from bootprint.service import Context, Service
 from sa_hub.assembly import build_hub
+from sa_hub.companions.keeping import Keeping
 from sa_hub.companions.together import companions_of
+from sa_hub.first_second import FirstSecond
 from sa_hub.hub import STEP_NS, HubCore
 from sa_hub.keys import load_group_key, load_next_key
 from sa_hub.radio.counters import FileCounters
@@ -63,21 +65,32 @@ def _is_sensed(track: Track) -> bool:
 
 
 class HubPart:
-    """A hub's core with its links; replay memory is kept before what a frame said is published."""
+    """A hub's core with its links; replay memory is kept before what a frame said is published.
+
+    Where there is an archive, notices are acknowledged by radio when it has them.
+    """
 
     def __init__(
-        self, context: Context, core: HubCore, settings: HubSettings, memories: Mapping[str, MemoryFile]
+        self,
+        context: Context,
+        core: HubCore,
+        settings: HubSettings,
+        memories: Mapping[str, MemoryFile],
+        first_second: FirstSecond,
     ) -> None:
         self._context = context
         self._core = core
         self._latency = LatencyGauge(context.clock)
         self._memories = memories
+        self._first_second = first_second
         self._memory_faults = 0
         self._frames_dropped = 0
         self._ticked_ns: int | None = None
         self._arrivals: deque[tuple[str, bytes]] = deque(maxlen=_MOST_WAITING)
         self._companions = companions_of(context, settings, self._announce, self._place)
+        self._keeping = Keeping(self._companions.entrust)
         self._links = self._open(settings.links)
+        self._hold()
 
     def _open(self, profiles: Iterable[LinkProfile]) -> dict[str, Link]:
         computer = self._context.computer
@@ -146,13 +159,19 @@ class HubPart:
 
     def tick(self, now_ns: int) -> list[Envelope]:
         """Event time goes on; what the nets have to say goes out."""
-        outputs = self._made_up(now_ns) + self._receive(now_ns)
-        for name, link in self._links.items():
-            self._core.hold(name, busy=link.busy)
-        outputs += self._core.tick(now_ns)
+        heard = self._made_up(now_ns) + self._receive(now_ns)
+        self._keeping.heard(heard)
+        self._core.kept(self._keeping.until(), self._keeping.look)
+        self._hold()
+        said = self._told(self._core.tick(now_ns))
         for frame in self._core.take_frames():
             self._links[frame.link].send(frame.data)
-        return self._told(outputs)
+        return heard + said
+
+    def _hold(self) -> None:
+        """Nets whose modem is busy, and those that may not speak yet, keep back what is due."""
+        for name, link in self._links.items():
+            self._core.hold(name, busy=link.busy or self._first_second.waits(name))
 
     def _made_up(self, now_ns: int) -> list[Envelope]:
         """After standing still, what would have been said meanwhile is not said now, all at once."""
@@ -172,6 +191,7 @@ class HubPart:
             "link_garbled": sum(link.garbled for link in self._links.values()),
             "memory_faults": self._memory_faults,
             "frames_dropped": self._frames_dropped,
+            "acknowledged_unkept": self._keeping.unkept,
         }
         beside = self._companions.figures()
         note = figures.note or "; ".join(link.fault for link in self._links.values() if link.fault)
@@ -201,9 +221,13 @@ def build(context: Context) -> HubPart:
     key_file = computer.keys_dir / f"{settings.group_key or computer.realm.group_key}.key"
     radio_dir = computer.state_dir / "radio"
     files = {link.name: MemoryFile(radio_dir / f"{link.name}.heard") for link in settings.links}
+    first = FirstSecond()
+    if context.lossless:
+        first.started()  # a replay at full speed would be over before anybody spoke
 
     def counters(net: str) -> FileCounters:
-        return FileCounters(radio_dir / f"{net}.counters", time.time, earlier_life=files[net].path)
+        path = radio_dir / f"{net}.counters"
+        return FileCounters(path, time.time, earlier_life=files[net].path, sleep=first.waiting(net))
 
     def memory(net: str) -> Memory:
         loaded, sound = files[net].load()
@@ -220,7 +244,8 @@ def build(context: Context) -> HubPart:
         memories=memory,
         next_key=load_next_key(key_file),
     )
-    return HubPart(context, core, settings, files)
+    first.started()
+    return HubPart(context, core, settings, files, first)
 
 
 SERVICE = Service(

@@ -1,6 +1,6 @@
-"""Telling a net anew what it was told before: to one who asked for the picture, and after contact came back."""
+"""What nets are told of others: by a relay, to one who asked for the picture, and after contact came back."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from bootprint.clock import NS_PER_S
@@ -13,7 +13,7 @@ ANSWER_NS: Final = 5 * NS_PER_S
 
 
 class Retelling:
-    """What each net is to hear again, by the net's name."""
+    """What a relay passes on, and what each net is to hear again, by the net's name."""
 
     def __init__(self, tracks: Tracks, own: int, *, relays: bool) -> None:
         self._tracks = tracks
@@ -38,6 +38,20 @@ class Retelling:
             return ()
         known = (self._tracks.get(number) for number in numbers - {self._own})
         return [one_hop_on(each.report) for each in known if each and each.report.hops < MAX_HOPS]
+
+    def candidates(self, own: Report | None) -> list[Report]:
+        """What every net may be told: our own report and, from a relay, others' that it may pass on; by number."""
+        found = [] if own is None else [own]
+        if self._relays:
+            found += self._to_pass_on()
+        return sorted(found, key=lambda report: report.number)
+
+    def _to_pass_on(self) -> Iterator[Report]:
+        """Others' reports that are not lost and may pass another relay."""
+        for known in self._tracks.all():
+            passable = known.state != "lost" and known.report.hops < MAX_HOPS
+            if passable and known.report.number != self._own:
+                yield known.passed_on
 
     def clear(self) -> None:
         """The clock was set back: who still wants something asks again."""

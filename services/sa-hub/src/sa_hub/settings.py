@@ -17,7 +17,9 @@ from typing import Annotated, Final, Literal
 
 import msgspec
 
+from bootprint.clock import NS_PER_S
 from bootprint.config import Config
+from bootprint.display import Ages
 from bootprint.errors import ConfigError
 from bootprint.topics import check_part
 from sa_hub.awareness.settings import WarningSettings
@@ -58,6 +60,16 @@ class HubSettings(Config, frozen=True):
     def relays(self) -> bool:
         """Whether this hub passes on what it hears."""
         return self.role != "soldier"
+
+    @property
+    def ages(self) -> Ages:
+        """From when on others are stale, and anybody is lost."""
+        return Ages(round(self.stale_s * NS_PER_S), round(self.lost_s * NS_PER_S))
+
+    @property
+    def own_ages(self) -> Ages:
+        """The same of the hub's own soldier."""
+        return Ages(round(self.own_stale_s * NS_PER_S), round(self.lost_s * NS_PER_S))
 
 
 def check_settings(settings: HubSettings, where: str) -> None:

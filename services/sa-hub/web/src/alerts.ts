@@ -1,8 +1,9 @@
 // Alerts that cannot be missed: a banner over everything until somebody acknowledges it, and a sound if wanted.
 
-import { duration } from "./display.ts";
+import { clock, duration } from "./display.ts";
 import { post, Refusal } from "./link.ts";
 import type { State } from "./state.ts";
+import type { Alert, Warning } from "./types.ts";
 import { at, h, replaceIfNew, toast } from "./ui.ts";
 
 const MOST = 4;
@@ -20,24 +21,45 @@ export class Alerts {
     this.onShow = onShow;
   }
 
+  /** The newest lies lowest, so that none moves when another comes. */
   draw(): void {
-    const unseen = this.state.unseenAlerts();
-    const near = [...this.state.warnings.values()].filter((each) => each.reasons.length > 0 && this.state.live_s - each.time_s < WARNING_S);
-    const key = `${unseen.map((each) => each.id).join()} ${near.length} ${Math.floor(this.state.live_s)}`;
+    const { state } = this;
+    const unseen = state.unseenAlerts();
+    const shown = unseen.slice(0, MOST).reverse();
+    const near = [...state.warnings.values()].filter((each) => each.reasons.length > 0 && state.live_s - each.time_s < WARNING_S);
+    const then = state.alertsThen();
     document.body.classList.toggle("alarmed", unseen.length > 0);
     document.title = unseen.length ? `⚠ ${unseen.length} · bootprint` : "bootprint · command post";
-    replaceIfNew(at("alerts"), key, () => [
-      ...unseen.slice(0, MOST).map((each) => h("div", { class: `alert ${each.kind}`, "data-alert": each.id },
-        h("b", {}, each.kind.toUpperCase()),
-        h("button", { class: "from", onclick: () => this.onShow(each.soldier) }, this.state.callsign(each.soldier)),
-        h("span", { class: "text" }, each.text),
-        h("span", {}, `${duration(this.state.live_s - each.time_s)} ago`),
-        this.state.mayOperate ? h("button", { class: "seen", onclick: () => void this.acknowledge(each.id) }, "Acknowledge (A)") : null)),
-      ...near.map((each) => h("div", { class: "alert warning" }, h("b", {}, "FRIENDLY"), h("button", { class: "from", onclick: () => this.onShow(each.friendly) }, this.state.callsign(each.friendly)),
-        h("span", { class: "text" }, `${each.reasons.map((reason) => reason.replaceAll("_", " ")).join(", ")}, ${each.distance_m.toFixed(0)} m`))),
-      unseen.length > MOST ? h("div", { class: "alert" }, `and ${unseen.length - MOST} more`) : null,
-    ]);
+    const kind = [...[...shown, ...then].map((each) => each.id), ...near.map((each) => each.friendly), unseen.length > MOST].join();
+    replaceIfNew(at("alerts"), `${kind} ${Math.floor(state.live_s)} ${near.map((each) => each.distance_m).join()}`, () => [
+      unseen.length > MOST ? h("div", { class: "alert more" }, `and ${unseen.length - MOST} older`) : null,
+      ...shown.map((each) => this.banner(each)),
+      ...near.map((each) => this.warning(each)),
+      ...then.map((each) => this.bannerThen(each)),
+    ], kind);
     this.ring(unseen.map((each) => each.id));
+  }
+
+  private banner(alert: Alert): HTMLElement {
+    return h("div", { class: `alert ${alert.kind}`, "data-alert": alert.id },
+      h("b", {}, alert.kind.toUpperCase()), this.from(alert.soldier), h("span", { class: "text" }, alert.text),
+      h("span", { class: "age" }, `${duration(this.state.live_s - alert.time_s)} ago`),
+      this.state.mayOperate ? h("button", { class: "seen", onclick: () => void this.acknowledge(alert.id) }, "Acknowledge (A)") : null);
+  }
+
+  /** While looking back: what was alerted then. */
+  private bannerThen(alert: Alert): HTMLElement {
+    return h("div", { class: "alert then" }, h("b", {}, alert.kind.toUpperCase()), this.from(alert.soldier),
+      h("span", { class: "text" }, alert.text), h("span", { class: "age" }, `at ${clock(alert.time_s)}`));
+  }
+
+  private warning(near: Warning): HTMLElement {
+    return h("div", { class: "alert warning" }, h("b", {}, "FRIENDLY"), this.from(near.friendly),
+      h("span", { class: "text" }, `${near.reasons.map((reason) => reason.replaceAll("_", " ")).join(", ")}, ${near.distance_m.toFixed(0)} m`));
+  }
+
+  private from(soldier: string): HTMLElement {
+    return h("button", { class: "from", onclick: () => this.onShow(soldier) }, this.state.callsign(soldier));
   }
 
   async acknowledge(id = this.state.unseenAlerts()[0]?.id): Promise<void> {

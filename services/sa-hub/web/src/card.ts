@@ -8,7 +8,7 @@ import { at, h, replaceIfNew } from "./ui.ts";
 export function drawCard(state: State, actions: { follow: () => void; centre: () => void; fix: () => void; bearing: () => void; close: () => void }): void {
   const card = at("card");
   const seen = state.selected === null ? undefined : state.seen().find((each) => each.track.soldier === state.selected);
-  const [wide, classes] = [matchMedia("(min-width: 1181px)").matches, document.body.classList];
+  const [wide, classes] = [matchMedia("(min-width: 1301px)").matches, document.body.classList];
   const home = (wide ? !classes.contains("no-right") : classes.contains("show-right")) ? at("right") : at("over");
   if (card.parentElement !== home) home.id === "right" ? home.prepend(card) : home.append(card);
   card.hidden = state.selected === null;
@@ -34,5 +34,5 @@ export function drawCard(state: State, actions: { follow: () => void; centre: ()
       h("button", { class: state.following ? "on" : "", onclick: actions.follow }, "Follow (G)"),
       state.mayOperate && h("button", { onclick: actions.bearing }, "Sees… (B)"),
       state.mayOperate && h("button", { onclick: actions.fix }, "Is here… (X)")),
-  ]);
+  ], state.selected);
 }

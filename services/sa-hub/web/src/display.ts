@@ -67,6 +67,11 @@ export function duration(seconds: number): string {
   return hours ? `${hours}:${two(minutes % 60)}:${two(whole % 60)}` : `${minutes}:${two(whole % 60)}`;
 }
 
+/** The time of day, UTC. */
+export function clock(time_s: number): string {
+  return `${new Date(1000 * time_s).toISOString().slice(11, 19)}Z`;
+}
+
 /** How far a picture can be relied on, for people: by what measures the soldier and the circle that holds them. */
 export function reliability(mode: string, radius_95_m: number): "good" | "fair" | "poor" | "none" {
   if (mode === "unplaced" || mode === "lost") return "none";

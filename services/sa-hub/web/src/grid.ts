@@ -20,15 +20,14 @@ export class Grid {
   private drawn: Bounds | null = null;
   private spacing = 0;
 
-  /** Whether the lines are others than before. */
-  cover(view: Bounds): boolean {
+  /** See to it that there are lines for a view. */
+  cover(view: Bounds): void {
     const spacing = isDrawn(view) ? gridSpacing(view.west, view.south, view.east, view.north) : 0;
-    if (spacing === this.spacing && (spacing === 0 || (this.drawn !== null && within(view, this.drawn)))) return false;
+    if (spacing === this.spacing && (spacing === 0 || (this.drawn !== null && within(view, this.drawn)))) return;
     const [wide, high] = [MARGIN * (view.east - view.west), MARGIN * (view.north - view.south)];
     this.drawn = { west: view.west - wide, south: view.south - high, east: view.east + wide, north: view.north + high };
     this.spacing = spacing;
     this.lines = spacing === 0 ? [] : gridLines(this.drawn.west, this.drawn.south, this.drawn.east, this.drawn.north, spacing);
-    return true;
   }
 
   /** Each line's figure and where it meets a parallel near the view's lower edge, or a meridian near its right one. */

@@ -1,7 +1,7 @@
 // The layers of what stands still on the map, and all colours by theme. Colours are Okabe and Ito's, told apart by
 // colour-blind people too; a state never shows by its colour alone.
 
-import type { LayerSpecification } from "maplibre-gl";
+import type { LayerSpecification, Map as MapLibre } from "maplibre-gl";
 
 export type Theme = "dark" | "light";
 
@@ -19,6 +19,7 @@ export const TEXTS = {
 } as const;
 export const HALOS = { dark: SHADES.dark.halo, light: SHADES.light.halo };
 export const TRAILS = { dark: SHADES.dark.trail, light: SHADES.light.trail };
+export const GRIDS = { dark: { minor: SHADES.dark.grid, major: SHADES.dark.major }, light: { minor: SHADES.light.grid, major: SHADES.light.major } };
 export const FIGURES = { dark: SHADES.dark.gridText, light: SHADES.light.gridText };
 
 export const FONT = ["Noto Sans Regular"];
@@ -28,7 +29,6 @@ export function layers(theme: Theme): LayerSpecification[] {
   const kind = (name: string) => ["==", ["get", "kind"], name];
   return [
     { id: "ground", type: "background", paint: { "background-color": shade.ground } },
-    { id: "grid", source: "grid", type: "line", paint: { "line-color": ["case", ["get", "major"], shade.major, shade.grid], "line-width": ["case", ["get", "major"], 1.4, 0.8] } },
     { id: "outdoor", source: "plan", type: "line", filter: kind("outdoor"), paint: { "line-color": shade.grid, "line-dasharray": [4, 3] } },
     { id: "obstacles", source: "plan", type: "fill", filter: kind("obstacle"), paint: { "fill-color": shade.obstacle, "fill-outline-color": shade.stairs } },
     { id: "rooms", source: "plan", type: "fill", filter: kind("room"), paint: { "fill-color": shade.room, "fill-opacity": 0.92 } },
@@ -39,4 +39,9 @@ export function layers(theme: Theme): LayerSpecification[] {
     { id: "lifts", source: "plan", type: "circle", filter: kind("lift"), paint: { "circle-radius": 7, "circle-color": shade.room, "circle-stroke-color": shade.wall, "circle-stroke-width": 2 } },
     { id: "plan-names", source: "plan", type: "symbol", minzoom: 18.2, filter: ["any", kind("room"), kind("place"), kind("stairs"), kind("lift")], layout: { "text-field": ["coalesce", ["get", "name"], ""], "text-font": FONT, "text-size": 11 }, paint: { "text-color": shade.gridText, "text-halo-color": shade.halo, "text-halo-width": 1 } },
   ] as LayerSpecification[];
+}
+
+/** Layers of a source that holds nothing are hidden, or its empty tiles would have the map drawn again and again. */
+export function showLayers(map: MapLibre, source: string, visible: boolean): void {
+  for (const each of layers("dark")) if ("source" in each && each.source === source) map.setLayoutProperty(each.id, "visibility", visible ? "visible" : "none");
 }

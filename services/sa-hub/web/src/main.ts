@@ -32,6 +32,8 @@ const KEYS: [key: string, what: string][] = [
   ["Esc", "leave a tool, or the selection"], ["?", "these keys"],
 ];
 
+const ROLES: Record<Post["role"], string> = { view: "looks on", operate: "operates", admin: "administers" };
+
 async function signedIn(): Promise<Post> {
   for (;;) {
     try {
@@ -62,11 +64,11 @@ class Page {
     this.map = new SquadMap("map", state, this.theme);
     this.rooms = new Rooms(state, this.map);
     this.roster = new Roster(state, (soldier) => this.select(soldier, true));
-    this.side = new Side(state, (seen) => this.map.show([seen.longitude_deg, seen.latitude_deg], 19));
     this.alerts = new Alerts(state, (soldier) => this.select(soldier, true));
+    this.buildTop();
+    this.side = new Side(state, { show: (place) => this.map.show(place, 19), select: (soldier) => this.select(soldier, true) });
     this.tools = new Tools(state, this.map);
     this.timeline = new Timeline(state, () => this.draw());
-    this.buildTop();
     this.bind();
     if (state.post.basemap !== null) void this.map.addBasemap(state.post.basemap).catch(() => toast("the basemap cannot be read", true));
   }
@@ -98,8 +100,8 @@ class Page {
   private beat(): void {
     const began = performance.now();
     this.draw();
-    const spent = performance.now() - began;
-    setTimeout(() => requestAnimationFrame(() => this.beat()), Math.min(MOST_MS, Math.max(CLOCK_MS, 6 * spent)));
+    const spent = performance.now() - began + this.map.spent_ms;
+    setTimeout(() => this.beat(), Math.min(MOST_MS, Math.max(CLOCK_MS, 6 * spent)));
   }
 
   private draw(): void {
@@ -144,7 +146,7 @@ class Page {
       h("span", { class: "realm" }, `${post_.realm} · ${this.state.callsign(post_.soldier)}`),
       h("span", { id: "line", role: "status" }),
       h("span", { class: "spring" }),
-      h("span", { id: "watching" }),
+      h("span", { class: "realm" }, post_.who === "local" ? "" : `${post_.who} (${ROLES[post_.role]})`),
       h("button", { id: "roster-toggle", title: "Roster", onclick: () => document.body.classList.toggle("no-left") }, icon("roster")),
       h("button", { id: "side-toggle", title: "Radio and health", onclick: () => this.toggleSide() }, icon("side")),
       h("button", { id: "sound", title: "Sound of alerts", onclick: () => this.toggleSound() }, icon(this.alerts.sound ? "sound-on" : "sound-off")),
@@ -170,7 +172,7 @@ class Page {
     replaceIfNew(at("floors"), key, () => [
       h("button", { class: this.state.floor === null ? "on" : "", "data-floor": "all", title: "All floors (0)", onclick: () => this.chooseFloor(null) }, "all"),
       ...floors.map((each) => h("button", { class: this.state.floor === each ? "on" : "", "data-floor": each, onclick: () => this.chooseFloor(each) }, String(each), h("small", {}, counts.has(each) ? String(counts.get(each)) : ""))),
-    ]);
+    ], floors.join());
   }
 
   private chooseFloor(floor: number | null): void {

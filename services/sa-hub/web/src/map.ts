@@ -1,12 +1,12 @@
-// The map: grid or basemap and buildings as MapLibre draws them, and the overlay of everything that moves.
+// The map: basemap and buildings as MapLibre draws them, and the overlay of the grid and everything that moves.
 
-import { Map as MapLibre, addProtocol, setWorkerUrl, type GeoJSONSource, type LayerSpecification, type StyleSpecification } from "maplibre-gl";
+import { Map as MapLibre, ScaleControl, addProtocol, setWorkerUrl, type GeoJSONSource, type LayerSpecification, type StyleSpecification } from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?worker&url";
 import "maplibre-gl/dist/maplibre-gl.css";
 import { Protocol } from "pmtiles";
 import { basemapLayers, basemapOf, type Basemap } from "./basemap.ts";
 import { Grid, type Bounds } from "./grid.ts";
-import { layers, type Theme } from "./layers.ts";
+import { layers, showLayers, type Theme } from "./layers.ts";
 import { marksOf, trailsOf } from "./marks.ts";
 import { Overlay, type Draft } from "./overlay.ts";
 import { ROOMS_SOURCE } from "./rooms.ts";
@@ -16,7 +16,8 @@ import { afterPaint } from "./ui.ts";
 import { View } from "./view.ts";
 
 type Feature = GeoJSON.Feature;
-const SOURCES = ["grid", "plan", ROOMS_SOURCE];
+const SOURCES = ["plan", ROOMS_SOURCE];
+const LOWEST = "outdoor"; // of what lies over a basemap
 const FIT_PX = { top: 90, bottom: 130, left: 130, right: 110 }; // names stay clear of tools, floors and timeline
 const FIGURES_PX = { right: 6, low: 76 }; // above the timeline
 
@@ -25,11 +26,15 @@ export class SquadMap {
   readonly overlay: Overlay;
   plan: Feature[] = [];
   ready = false;
+  /** What the overlay took the last time. */
+  spent_ms = 0;
   private readonly state: State;
   private readonly grid = new Grid();
   private theme: Theme;
   private basemap: Basemap | null = null;
   private draft: Draft = { places: [], ring: false, text: "" };
+  private isDue = false;
+  private put: Place | null = null; // to the middle, unless something else is wanted meanwhile
   private planFloor: number | null = null;
   private readonly bySoftware: boolean;
 
@@ -50,6 +55,7 @@ export class SquadMap {
       dragRotate: false,
     });
     this.map.touchZoomRotate.disableRotation();
+    this.map.addControl(new ScaleControl({ maxWidth: 110 }), "bottom-left");
     this.bySoftware = isDrawnBySoftware(this.map.getCanvas());
     this.overlay = new Overlay(theme, this.bySoftware);
     this.map.getCanvasContainer().append(this.overlay.canvas);
@@ -66,7 +72,7 @@ export class SquadMap {
     await new Promise<void>((resolve) => (this.ready ? resolve() : void this.map.once("load", () => resolve())));
     this.basemap = basemap;
     this.map.addSource("basemap", basemap.source);
-    for (const layer of basemapLayers(basemap, this.theme)) this.map.addLayer(layer, "grid");
+    for (const layer of basemapLayers(basemap, this.theme)) this.map.addLayer(layer, LOWEST);
   }
 
   setTheme(theme: Theme): void {
@@ -82,19 +88,28 @@ export class SquadMap {
     if (!this.ready) return;
     this.drawPlan();
     this.follow();
-    this.drawOverlay();
+    this.overlaySoon();
+  }
+
+  /** With the next frame, and once in it, however much asks for it; where the map below moves, together with it. */
+  private overlaySoon(): void {
+    if (this.isDue) return;
+    this.isDue = true;
+    requestAnimationFrame(() => this.isDue && this.drawOverlay());
   }
 
   private drawOverlay(): void {
+    this.isDue = false;
     if (!this.ready) return;
+    const began = performance.now();
     const { lng, lat } = this.map.getCenter();
     const { clientWidth, clientHeight } = this.map.getContainer();
     const view = new View([lng, lat], this.map.getZoom(), clientWidth, clientHeight);
-    const bounds = this.bounds();
-    if (this.grid.cover(bounds)) this.set("grid", this.grid.lines.map((each) => line(each.points, { major: each.major })));
+    this.grid.cover(this.bounds());
     const corner = this.map.unproject([clientWidth - FIGURES_PX.right, clientHeight - FIGURES_PX.low]);
     const figures = this.grid.figures(corner.lat, corner.lng).map(({ text, place }) => ({ text, at: view.toScreen(place) }));
-    this.overlay.draw(view, marksOf(this.state, this.map.getZoom(), this.theme), trailsOf(this.state), figures, this.draft);
+    this.overlay.draw(view, marksOf(this.state, this.map.getZoom(), this.theme), trailsOf(this.state), { lines: this.grid.lines, figures }, this.draft);
+    this.spent_ms = performance.now() - began;
   }
 
   private bounds(): Bounds {
@@ -105,11 +120,12 @@ export class SquadMap {
   /** What a tool is about to place: lines, points and their labels. */
   drawDraft(draft: Draft): void {
     this.draft = draft;
-    this.drawOverlay();
+    this.overlaySoon();
   }
 
   /** Show everybody who is not lost (but all if all are), and the buildings they may be in. */
   fit(): void {
+    this.put = null;
     const placed = this.state.seen().filter((each) => each.track.mode !== "unplaced");
     const known = placed.filter((each) => each.shown.state !== "lost");
     const places = (known.length ? known : placed).map((each) => each.shown.place);
@@ -129,7 +145,8 @@ export class SquadMap {
 
   /** Bring a place to the middle, and near enough. */
   show(place: Place, zoom: number): void {
-    const move = () => this.map.easeTo({ center: place, zoom: Math.max(this.map.getZoom(), zoom), duration: this.lasting(400) });
+    this.put = place;
+    const move = () => this.put === place && this.map.easeTo({ center: place, zoom: Math.max(this.map.getZoom(), zoom), duration: this.lasting(400) });
     if (this.bySoftware) afterPaint(move);
     else move();
   }
@@ -160,6 +177,7 @@ export class SquadMap {
   }
 
   private set(source: string, features: Feature[]): void {
+    showLayers(this.map, source, features.length > 0);
     (this.map.getSource(source) as GeoJSONSource | undefined)?.setData({ type: "FeatureCollection", features });
   }
 }
@@ -171,15 +189,11 @@ function isDrawnBySoftware(canvas: HTMLCanvasElement): boolean {
   return info != null && /swiftshader|llvmpipe|softpipe|basic render/i.test(String(gl!.getParameter(info.UNMASKED_RENDERER_WEBGL)));
 }
 
-function line(coordinates: Place[], properties: Record<string, unknown>): Feature {
-  return { type: "Feature", geometry: { type: "LineString", coordinates }, properties };
-}
-
 function style(theme: Theme): StyleSpecification {
   const empty = { type: "geojson" as const, data: { type: "FeatureCollection" as const, features: [] } };
   return {
     version: 8,
     sources: Object.fromEntries(SOURCES.map((name) => [name, { ...empty }])),
-    layers: layers(theme),
+    layers: layers(theme).map((each) => ("source" in each ? { ...each, layout: { ...each.layout, visibility: "none" } } : each) as LayerSpecification),
   };
 }

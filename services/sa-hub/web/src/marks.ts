@@ -3,14 +3,16 @@
 import { courseOf, duration, facingOf, speedOf } from "./display.ts";
 import { moved } from "./geo.ts";
 import { PALETTE, TEXTS, type Theme } from "./layers.ts";
-import type { Seen, State } from "./state.ts";
+import { CROWD, TRAIL_S, type Seen, type State, type TrailPoint } from "./state.ts";
 import { foreignSymbol, observationSymbol, soldierSymbol, type Symbol } from "./symbols.ts";
 import type { Foreign, Observation, Place } from "./types.ts";
 
-export const CROWD = 100; // more are drawn without names, circles and trails from afar, or nothing could be read
 const CROWD_ZOOM = 17.5;
 const AHEAD_S = 5; // of the line that shows speed
 const MOVING_M_S = 0.3;
+const OTHERS_TRAIL_S = 60; // of who is not selected; more would be a tangle
+const SHADES = 4;
+const CLIMB_S = 20;
 const SEEN_COLOUR = "#cc79a7";
 const RADIUS_95 = 2.45;
 
@@ -41,7 +43,10 @@ export interface Mark {
 }
 
 export interface Trail {
-  places: Place[];
+  /** Lines, the older ones fainter (1 to 0); a trail that leaves the floor that is looked at is broken there. */
+  pieces: { places: Place[]; freshness: number }[];
+  /** Of who is selected: where another floor was reached by stairs or lift, and which. */
+  climbs: { place: Place; text: string }[];
   selected: boolean;
 }
 
@@ -51,18 +56,48 @@ export function marksOf(state: State, zoom: number, theme: Theme): Mark[] {
   const crowded = seen.length > CROWD && zoom < CROWD_ZOOM;
   const soldiers = seen.map((each) => soldierMark(each, state, crowded, theme));
   const others = state.past === null ? [...state.foreign.values()].map((each) => foreignMark(each, state.now_s, theme)) : [];
-  const things = newest([...state.observations.values()]).map((each) => observationMark(each, theme));
+  const things = newest(state.observationsShown()).map((each) => observationMark(each, theme));
   return [...soldiers.filter((each) => each.must), ...soldiers.filter((each) => !each.must), ...things, ...others];
 }
 
 export function trailsOf(state: State): Trail[] {
-  if (!state.trailsOn || state.past !== null) return [];
-  const crowd = state.trails.size > CROWD;
-  const wanted = [...state.trails].filter(([soldier]) => !crowd || soldier === state.selected);
-  return wanted.map(([soldier, trail]) => ({
-    places: trail.filter((each) => state.floor === null || each.floor === null || each.floor === state.floor).map((each) => each.place),
-    selected: soldier === state.selected,
-  }));
+  if (!state.trailsOn) return [];
+  const crowd = state.seen().length > CROWD;
+  const wanted = state.seen().map((each) => each.track.soldier).filter((each) => !crowd || each === state.selected);
+  return wanted.map((soldier) => trailOf(state.trail(soldier), state.floor, soldier === state.selected));
+}
+
+/** Until the last report: of somebody lost the way there is what helps to find them. */
+function trailOf(points: TrailPoint[], floor: number | null, selected: boolean): Trail {
+  const end_s = points.at(-1)?.time_s ?? 0;
+  const lasts_s = selected ? TRAIL_S : OTHERS_TRAIL_S;
+  const trail: Trail = { pieces: [], climbs: [], selected };
+  let piece: Trail["pieces"][number] | undefined;
+  let [from, climbed_s]: [number | null, number] = [null, -Infinity];
+  for (const each of points.filter((point) => end_s - point.time_s < lasts_s)) {
+    const shown = floor === null || each.floor === null || each.floor === floor;
+    const freshness = 1 - Math.floor((SHADES * (end_s - each.time_s)) / lasts_s) / SHADES;
+    if (!shown) piece = undefined;
+    else if (piece?.freshness === freshness) piece.places.push(each.place);
+    else trail.pieces.push((piece = { places: [...(piece ? [piece.places.at(-1)!] : []), each.place], freshness }));
+    if (selected && from !== null && each.floor !== null && each.floor !== from && (shown || from === floor)) {
+      if (each.time_s - climbed_s < CLIMB_S) trail.climbs.pop(); // to and fro on the stairs
+      trail.climbs.push({ place: each.place, text: `${arrow(from, each.floor)} ${each.floor}` });
+      climbed_s = each.time_s;
+    }
+    from = each.floor ?? from;
+  }
+  return trail;
+}
+
+/** That somebody has just come to another floor, and from where; of who was lost doing so it is soon no news. */
+export function climbOf(points: TrailPoint[], floor: number | null, now_s: number): string {
+  const before = points.findLast((each) => each.floor !== null && each.floor !== floor);
+  return before === undefined || floor === null || now_s - before.time_s > CLIMB_S ? "" : arrow(before.floor!, floor);
+}
+
+function arrow(from: number, to: number): string {
+  return to > from ? "▲" : "▼";
 }
 
 function soldierMark({ track, shown, soldier }: Seen, state: State, crowded: boolean, theme: Theme): Mark {
@@ -70,8 +105,9 @@ function soldierMark({ track, shown, soldier }: Seen, state: State, crowded: boo
   const here = state.floor === null || track.floor === null || track.floor === state.floor;
   const [fresh, plain] = [shown.state === "fresh", !crowded || selected];
   const label: Line[] = [];
-  if (plain || !fresh) label.push({ text: soldier.callsign + (state.floor === null && track.floor !== null ? `  ⌂${track.floor}` : ""), colour: TEXTS[theme].fresh });
-  if (!fresh || selected) label.push({ text: shown.words, colour: TEXTS[theme][shown.state], bold: shown.state === "lost" });
+  const floor = state.floor === null && track.floor !== null ? `  ⌂${track.floor}` : "";
+  if (plain || !fresh) label.push({ text: `${soldier.callsign}${floor}${climbOf(state.trail(track.soldier), track.floor, state.now_s)}`, colour: TEXTS[theme].fresh });
+  if (!fresh || selected) label.push({ text: [shown.words, fresh && speedOf(track) >= MOVING_M_S ? `${speedOf(track).toFixed(1)} m/s` : ""].filter(Boolean).join(" · "), colour: TEXTS[theme][shown.state], bold: shown.state === "lost" });
   return {
     id: track.soldier,
     place: shown.place,

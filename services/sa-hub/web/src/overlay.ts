@@ -1,9 +1,9 @@
-// A canvas over the map with everything that moves. The map below is drawn only when somebody moves it: to draw it
-// for each report, its symbols' layout and all, takes a computer without graphics hardware a second.
+// A canvas over the map with the grid and everything that moves. The map below is drawn only when somebody moves it:
+// to draw it for each report, its symbols' layout and all, takes a computer without graphics hardware a second.
 
 import { View } from "./view.ts";
 import { place, type Side, type Wish } from "./labels.ts";
-import { FIGURES, HALOS, TEXTS, TRAILS, type Theme } from "./layers.ts";
+import { FIGURES, GRIDS, HALOS, TEXTS, TRAILS, type Theme } from "./layers.ts";
 import type { Line, Mark, Trail } from "./marks.ts";
 import { PIXELS } from "./symbols.ts";
 import type { Place } from "./types.ts";
@@ -32,6 +32,11 @@ export interface Draft {
   text: string;
 }
 
+export interface GridDrawing {
+  lines: { points: Place[]; major: boolean }[];
+  figures: { text: string; at: Point }[];
+}
+
 export class Overlay {
   readonly canvas: HTMLCanvasElement;
   /** What stands on the screen, by id; the topmost first. */
@@ -50,13 +55,15 @@ export class Overlay {
     this.pen = this.canvas.getContext("2d", { willReadFrequently: bySoftware })!;
   }
 
-  draw(view: View, marks: Mark[], trails: Trail[], edges: { text: string; at: Point }[], draft: Draft): void {
+  draw(view: View, marks: Mark[], trails: Trail[], grid: GridDrawing, draft: Draft): void {
     this.view = view;
     this.clear();
+    for (const major of [false, true]) this.grid(grid.lines.filter((each) => each.major === major), major);
     for (const each of trails) this.trail(each);
     const near = marks.map((mark): Drawn => ({ mark, at: view.toScreen(mark.place), label: false })).filter((each) => this.matters(each));
     for (const each of near) this.ground(each);
-    this.edges(edges);
+    for (const each of trails) this.climbs(each);
+    this.edges(grid.figures);
     const shown = near.filter((each) => view.isNear(each.at, FAR_PX));
     for (const each of [...shown].reverse()) this.symbol(each);
     this.labels(shown);
@@ -91,18 +98,35 @@ export class Overlay {
     return this.view.isNear(at, FAR_PX + reach) || mark.since !== null;
   }
 
-  private trail({ places, selected }: Trail): void {
-    const { pen, view } = this;
-    pen.beginPath();
-    let last: Point | null = null;
-    for (const each of places) {
-      const point = view.toScreen(each);
-      if (last === null) pen.moveTo(...point);
-      else if (Math.hypot(point[0] - last[0], point[1] - last[1]) < FINE_PX) continue;
-      else pen.lineTo(...point);
-      last = point;
+  private grid(lines: GridDrawing["lines"], major: boolean): void {
+    this.pen.beginPath();
+    for (const { points } of lines) {
+      points.forEach((each, index) => (index === 0 ? this.pen.moveTo(...this.view.toScreen(each)) : this.pen.lineTo(...this.view.toScreen(each))));
     }
-    this.stroke(TRAILS[this.theme], selected ? 3 : 1.6, selected ? 0.9 : 0.32);
+    this.stroke(GRIDS[this.theme][major ? "major" : "minor"], major ? 1.4 : 0.8, 1);
+  }
+
+  private trail({ pieces, selected }: Trail): void {
+    const { pen, view } = this;
+    for (const { places, freshness } of pieces) {
+      pen.beginPath();
+      let last: Point | null = null;
+      for (const each of places) {
+        const point = view.toScreen(each);
+        if (last === null) pen.moveTo(...point);
+        else if (Math.hypot(point[0] - last[0], point[1] - last[1]) < FINE_PX) continue;
+        else pen.lineTo(...point);
+        last = point;
+      }
+      this.stroke(TRAILS[this.theme], selected ? 3 : 1.8, (selected ? 0.9 : 0.55) * freshness);
+    }
+  }
+
+  /** Where somebody came to another floor. */
+  private climbs({ climbs, selected }: Trail): void {
+    this.pen.textAlign = "center";
+    this.pen.globalAlpha = selected ? 1 : 0.6;
+    for (const { place: where, text } of climbs) this.text({ text, colour: TRAILS[this.theme], bold: true }, ...this.view.toScreen(where));
   }
 
   /** What of a mark lies on the ground: its circle, and lines to where it was and will be. */
@@ -151,22 +175,19 @@ export class Overlay {
   }
 
   /** A head outside of the symbol that points where the soldier goes. */
-  private arrow(at: Point, azimuth: number, mark: Mark): void {
+  private arrow([x, y]: Point, azimuth: number, mark: Mark): void {
     const { pen } = this;
-    const reach = mark.symbol.height / 2 + 13;
-    pen.save();
-    pen.translate(...at);
-    pen.rotate(azimuth);
+    const [sine, cosine, reach] = [Math.sin(azimuth), Math.cos(azimuth), mark.symbol.height / 2 + 13];
+    const to = (aside: number, ahead: number): Point => [x + aside * cosine + ahead * sine, y + aside * sine - ahead * cosine];
     pen.beginPath();
-    pen.moveTo(0, -reach);
-    pen.lineTo(7, 12 - reach);
-    pen.lineTo(0, 9 - reach);
-    pen.lineTo(-7, 12 - reach);
+    pen.moveTo(...to(0, reach));
+    pen.lineTo(...to(7, reach - 12));
+    pen.lineTo(...to(0, reach - 9));
+    pen.lineTo(...to(-7, reach - 12));
     pen.closePath();
     pen.fillStyle = mark.colour;
     pen.fill();
     this.stroke(HALOS[this.theme], 1.2, mark.opacity);
-    pen.restore();
   }
 
   /** What a tool is about to place, over everything. */
@@ -237,7 +258,7 @@ export class Overlay {
   }
 
   /** The grid's figures at the edges: they end where they are put. */
-  private edges(edges: { text: string; at: Point }[]): void {
+  private edges(edges: GridDrawing["figures"]): void {
     this.pen.globalAlpha = 0.8;
     this.pen.textAlign = "right";
     for (const { text, at } of edges) this.text({ text, colour: FIGURES[this.theme] }, ...at);

@@ -1,6 +1,7 @@
 // Maps of rooms that soldiers' computers have drawn: what was walked and seen, on the floor that is looked at.
 
 import type { GeoJSONSource } from "maplibre-gl";
+import { showLayers } from "./layers.ts";
 import { get } from "./link.ts";
 import type { SquadMap } from "./map.ts";
 import type { State } from "./state.ts";
@@ -33,10 +34,12 @@ export class Rooms {
 
   draw(): void {
     const floor = this.state.floor ?? this.state.busiestFloor() ?? 0;
-    const key = `${floor}/${this.features.length}`;
+    const key = this.features.length ? `${floor}/${this.features.length}` : "";
     const source = this.map.ready ? (this.map.map.getSource(ROOMS_SOURCE) as GeoJSONSource | undefined) : undefined;
     if (key === this.drawn || source === undefined) return;
     this.drawn = key;
-    source.setData({ type: "FeatureCollection", features: this.features.filter((each) => each.properties?.floor === floor) });
+    const features = this.features.filter((each) => each.properties?.floor === floor);
+    showLayers(this.map.map, ROOMS_SOURCE, features.length > 0);
+    source.setData({ type: "FeatureCollection", features });
   }
 }

@@ -11,6 +11,7 @@ interface Row {
   name: HTMLElement;
   age: HTMLElement;
   line: HTMLElement;
+  tail: HTMLElement;
   symbol: HTMLElement;
   drawn: string;
 }
@@ -55,10 +56,11 @@ export class Roster {
   }
 
   private addRow(soldier: Soldier, onSelect: (soldier: string) => void): Row {
-    const [name, age, line, symbol] = [h("b", {}, soldier.callsign), h("span", { class: "age" }), h("small", {}), h("span", { class: "symbol" })];
+    const [name, age, symbol] = [h("b", {}, soldier.callsign), h("span", { class: "age" }), h("span", { class: "symbol" })];
+    const [line, tail] = [h("small", {}), h("small", { class: "tail" })];
     const root = h("button", { class: "row", "data-soldier": soldier.soldier, onclick: () => onSelect(soldier.soldier) },
-      symbol, h("span", { class: "who" }, h("span", { class: "first" }, name, age), line));
-    const row = { root, name, age, line, symbol, drawn: "" };
+      symbol, h("span", { class: "who" }, h("span", { class: "first" }, name, age), h("span", { class: "second" }, line, tail)));
+    const row = { root, name, age, line, tail, symbol, drawn: "" };
     this.watcher.observe(root);
     this.rows.set(soldier.soldier, row);
     return row;
@@ -69,6 +71,7 @@ export class Roster {
     const condition = seen?.status && seen.status.condition !== "ok" ? seen.status.condition : "";
     set(row.age, seen ? seen.shown.words : soldier.soldier === this.state.post.soldier ? "this post" : "never heard");
     set(row.line, seen ? lineOf(seen, condition) : soldier.role.replaceAll("_", " "));
+    set(row.tail, seen ? tailOf(seen) : "");
     const classes = `row ${state}${this.state.selected === soldier.soldier ? " selected" : ""}${condition ? " hurt" : ""}`;
     if (row.root.className !== classes) row.root.className = classes;
     if (row.drawn !== state) {
@@ -78,17 +81,20 @@ export class Roster {
   }
 }
 
-export function lineOf(seen: Seen, condition: string): string {
-  const { track, shown, status } = seen;
+function lineOf({ track, shown }: Seen, condition: string): string {
   const trust = reliability(track.mode, shown.radius_95_m);
   return [
     condition.toUpperCase(),
     MODES[track.mode] ?? track.mode,
     trust === "none" ? "" : `${trust} ±${shown.radius_95_m < 10 ? shown.radius_95_m.toFixed(1) : shown.radius_95_m.toFixed(0)} m`,
-    track.floor === null ? "" : `⌂${track.floor}`,
     speedOf(track) < 0.3 ? "" : `${speedOf(track).toFixed(1)} m/s`,
-    status?.battery_pct === null || status?.battery_pct === undefined ? "" : `battery ${status.battery_pct.toFixed(0)} %`,
   ].filter(Boolean).join(" · ");
+}
+
+/** What is never cut off: floor and battery. */
+function tailOf({ track, status }: Seen): string {
+  const battery = status?.battery_pct ?? null;
+  return [track.floor === null ? "" : `⌂${track.floor}`, battery === null ? "" : `▮${battery.toFixed(0)} %`].filter(Boolean).join(" ");
 }
 
 function set(element: HTMLElement, text: string): void {

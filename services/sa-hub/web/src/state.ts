@@ -5,7 +5,10 @@ import type { LineState } from "./link.ts";
 import type { Alert, Foreign, Health, Link, Observation, Picture, Place, Post, Soldier, Status, Track, Warning } from "./types.ts";
 
 const TRAIL_POINTS = 400;
+const THEN_S = 30; // an alert of the past is shown so long, or somewhat longer where time runs fast
+const THEN_PLAYED_S = 8;
 export const TRAIL_S = 180;
+export const CROWD = 100; // more are drawn without names, circles and trails from afar, or nothing could be read
 
 export interface TrailPoint {
   time_s: number;
@@ -41,6 +44,9 @@ export class State {
   tool: Tool = "select";
   /** While looking back: the moment, and everybody's newest track then. */
   past: { time_s: number; tracks: Map<string, Track>; playing: boolean; speed: number } | null = null;
+  trailsThen = new Map<string, TrailPoint[]>();
+  /** What the archive has of these, for looking back. */
+  archived: { alerts: Alert[]; observations: Observation[] } = { alerts: [], observations: [] };
   readonly post: Post;
   private inSight: Seen[] = [];
   private heard = { now_s: 0, host_s: 0 };
@@ -97,7 +103,7 @@ export class State {
     const found: Seen[] = [];
     for (const track of tracks.values()) {
       const soldier = this.roster.get(track.soldier) ?? unknown(track.soldier);
-      found.push({ soldier, track, shown: shown(track, this.now_s, this.ages), status: this.statuses.get(track.soldier) });
+      found.push({ soldier, track, shown: shown(track, this.now_s, this.ages), status: this.past === null ? this.statuses.get(track.soldier) : undefined });
     }
     return found.sort((one, other) => one.soldier.number - other.soldier.number);
   }
@@ -120,19 +126,43 @@ export class State {
     return [...this.alerts.values()].filter((each) => each.acknowledged_by === null).sort((a, b) => b.time_s - a.time_s);
   }
 
+  /** Alerts until the moment that is shown. */
+  alertsShown(): Alert[] {
+    return this.past === null ? [...this.alerts.values()] : before(this.archived.alerts, this.past.time_s);
+  }
+
+  /** Things seen until the moment that is shown. */
+  observationsShown(): Observation[] {
+    return this.past === null ? [...this.observations.values()] : before(this.archived.observations, this.past.time_s);
+  }
+
+  /** While looking back: what had just been alerted at that moment, the newest last. */
+  alertsThen(): Alert[] {
+    const { past } = this;
+    if (past === null) return [];
+    const since_s = past.time_s - Math.max(THEN_S, THEN_PLAYED_S * past.speed);
+    return this.alertsShown().filter((each) => each.time_s > since_s).sort((one, other) => one.time_s - other.time_s).slice(-4);
+  }
+
+  /** Where somebody has gone of late, as of the moment that is shown. */
+  trail(soldier: string): TrailPoint[] {
+    const { past } = this;
+    if (past === null) return this.trails.get(soldier) ?? [];
+    return before(this.trailsThen.get(soldier) ?? [], past.time_s).filter((each) => each.time_s > past.time_s - TRAIL_S);
+  }
+
   callsign(soldier: string): string {
     return this.roster.get(soldier)?.callsign ?? soldier;
   }
 
   /** A trail from the archive, to go before what has been heard since. */
   recall(feature: GeoJSON.Feature): void {
-    if (feature.geometry.type !== "LineString") return;
-    const { soldier, times_s, floors } = feature.properties as { soldier: string; times_s: number[]; floors: (number | null)[] };
+    const found = trailIn(feature);
+    if (found === null) return;
+    const [soldier, points] = found;
     const heard = this.trails.get(soldier) ?? [];
-    const before = feature.geometry.coordinates
-      .map((place, index): TrailPoint => ({ time_s: times_s[index]!, place: place as Place, floor: floors[index] ?? null }))
-      .filter((each) => heard.length === 0 || each.time_s < heard[0]!.time_s);
-    this.trails.set(soldier, [...before, ...heard].slice(-TRAIL_POINTS));
+    const earlier = points.filter((each) => heard.length === 0 || each.time_s < heard[0]!.time_s);
+    this.trails.set(soldier, [...earlier, ...heard].slice(-TRAIL_POINTS));
   }
 
   private lengthen(track: Track): void {
@@ -147,6 +177,17 @@ export class State {
   private setClock(now_s: number): void {
     this.heard = { now_s, host_s: performance.now() / 1000 };
   }
+}
+
+/** A soldier's trail as the archive tells it. */
+export function trailIn(feature: GeoJSON.Feature): [soldier: string, points: TrailPoint[]] | null {
+  if (feature.geometry.type !== "LineString") return null;
+  const { soldier, times_s, floors } = feature.properties as { soldier: string; times_s: number[]; floors: (number | null)[] };
+  return [soldier, feature.geometry.coordinates.map((place, index) => ({ time_s: times_s[index]!, place: place as Place, floor: floors[index] ?? null }))];
+}
+
+function before<T extends { time_s: number }>(all: T[], time_s: number): T[] {
+  return all.filter((each) => each.time_s <= time_s);
 }
 
 function merge<T>(into: Map<string, T>, news: Record<string, T>): void {

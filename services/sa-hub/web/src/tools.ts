@@ -56,7 +56,7 @@ export class Tools {
     this.draft();
     for (const [name, button] of this.buttons) if (name !== "trails") button.classList.toggle("on", name === tool);
     this.buttons.get("trails")!.classList.toggle("on", this.state.trailsOn);
-    at("hint").textContent = this.hint();
+    this.drawHint();
     this.map.map.getCanvas().style.cursor = tool === "select" ? "" : "crosshair";
   }
 
@@ -152,14 +152,20 @@ export class Tools {
     return this.state.seen().find((each) => each.track.soldier === this.state.selected)?.shown.place ?? null;
   }
 
+  /** What to do now, and a way out for fingers. */
+  private drawHint(): void {
+    const text = this.hint();
+    at("hint").replaceChildren(...(text ? [text, h("button", { onclick: () => this.choose("select") }, "Leave (Esc)")] : []));
+  }
+
   private hint(): string {
     const name = this.state.selected === null ? "" : this.state.callsign(this.state.selected);
     const hints: Record<Tool, string> = {
       select: "",
-      observe: "Click where the thing is · Esc to leave",
-      bearing: `Click the direction and distance from ${name} · Esc to leave`,
-      fix: `Click where ${name} is · Esc to leave`,
-      measure: "Click from point to point · Esc to leave",
+      observe: "Click where the thing is",
+      bearing: `Click the direction and distance from ${name}`,
+      fix: `Click where ${name} is`,
+      measure: "Click from point to point",
     };
     return hints[this.state.tool];
   }

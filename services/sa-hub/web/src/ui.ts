@@ -90,9 +90,36 @@ export function afterPaint(job: () => void): void {
   requestAnimationFrame(() => setTimeout(job));
 }
 
-/** Replace an element's children only if their text would change: hovering and focus survive. */
-export function replaceIfNew(element: HTMLElement, key: string, children: () => Child[]): void {
+/**
+ * Replace an element's children only if their text would change (`key`): hovering and focus survive. Where the new ones
+ * are of the same `kind` as the old, only texts and attributes change: a click that has begun on a button ends on it.
+ */
+export function replaceIfNew(element: HTMLElement, key: string, children: () => Child[], kind = key): void {
   if (element.dataset.key === key) return;
-  element.dataset.key = key;
-  element.replaceChildren(...children().filter((each): each is Node | string => each !== null && each !== undefined && each !== false));
+  const alike = element.dataset.kind === kind;
+  [element.dataset.key, element.dataset.kind] = [key, kind];
+  const nodes = children().filter((each): each is Node | string => each !== null && each !== undefined && each !== false);
+  if (alike) renew(element, nodes.map((each) => (typeof each === "string" ? document.createTextNode(each) : each)));
+  else element.replaceChildren(...nodes);
+}
+
+/** Make the children of an element like these by changing as little as can be. */
+function renew(element: Element, wanted: Node[]): void {
+  const there = [...element.childNodes];
+  wanted.forEach((node, index) => {
+    const old = there[index];
+    if (old instanceof Text && node instanceof Text) {
+      if (old.data !== node.data) old.data = node.data;
+    } else if (old instanceof Element && node instanceof Element && old.tagName === node.tagName && !(node instanceof HTMLCanvasElement)) {
+      renewAttributes(old, node);
+      renew(old, [...node.childNodes]);
+    } else if (old) old.replaceWith(node);
+    else element.append(node);
+  });
+  for (const old of there.slice(wanted.length)) old.remove();
+}
+
+function renewAttributes(old: Element, wanted: Element): void {
+  for (const { name } of [...old.attributes]) if (!wanted.hasAttribute(name)) old.removeAttribute(name);
+  for (const { name, value } of wanted.attributes) if (old.getAttribute(name) !== value) old.setAttribute(name, value);
 }

@@ -45,9 +45,15 @@ def vertical_sigma_m(fix: GnssFix, config: GnssConfig) -> float | None:
     return _believable(fix.vertical_accuracy_m, config.vertical_floor_m, config)
 
 
-def correlation_inflation(since_last_s: float, correlation_s: float) -> float:
-    """Factor on σ² for an update ``since_last_s`` after the last one: ``max(1, 2τ/Δt)``."""
-    return max(1.0, 2.0 * correlation_s / max(since_last_s, _SHORTEST_S))
+def correlation_inflation(since_last_s: float, moved_m: float, config: GnssConfig) -> float:
+    """Factor on σ² for an update so long after the last one, and so far from there: ``max(1, 2τ/Δt)``.
+
+    Reflections belong to the place. Who stands hears the same ones again and again, until satellites have moved on:
+    there the share of news is that of the way, or of the sky's turning, if that is less.
+    """
+    by_place = moved_m / config.reflection_m + since_last_s / config.standing_correlation_s
+    news = min(max(since_last_s, _SHORTEST_S) / max(config.correlation_s, _SHORTEST_S), by_place)
+    return max(1.0, 2.0 / max(news, _SHORTEST_S / config.standing_correlation_s))
 
 
 def noise(horizontal_m: float, vertical_m: float | None) -> Array:

@@ -12,6 +12,7 @@ from pdr_engine.body.settings import (
 )
 
 DEFAULT = "default"
+PNS_GPS = "c4"
 
 
 class _Parts(msgspec.Struct, frozen=True):
@@ -19,6 +20,9 @@ class _Parts(msgspec.Struct, frozen=True):
     azimuth: Azimuth = BodySettings().azimuth
     denoising: Denoising = HeadingSettings().denoising
     turn_shortening_s: float = LengthSettings().turn_shortening_s
+    classes: bool = BodySettings().classes
+    online_calibration: bool = BodySettings().online_calibration
+    retrace: bool = BodySettings().retrace
 
 
 _PARTS: dict[str, _Parts] = {
@@ -38,6 +42,12 @@ _PARTS: dict[str, _Parts] = {
     "a7-weighted": _Parts(azimuth="bridge-weighted"),
     "b3-stride": _Parts(denoising="stride"),
     "b3-wavelet": _Parts(denoising="wavelet"),
+    # The default without one of its parts.
+    "without-a3": _Parts(classes=False),
+    "without-a5": _Parts(online_calibration=False),
+    "without-b6": _Parts(turn_shortening_s=0.0, retrace=False),
+    # The default's steps without any fix; who adds them up lets `track.pns_gps` have the fixes.
+    PNS_GPS: _Parts(),
     # The textbook's pedometers.
     "weinberg-compass": _Parts("weinberg", "compass", turn_shortening_s=0.0),
     "weinberg-gyro": _Parts("weinberg", "gyro", turn_shortening_s=0.0),
@@ -55,4 +65,7 @@ def settings_of(method: str) -> BodySettings:
         azimuth=parts.azimuth,
         heading=HeadingSettings(denoising=parts.denoising),
         length=LengthSettings(turn_shortening_s=parts.turn_shortening_s),
+        classes=parts.classes,
+        online_calibration=parts.online_calibration,
+        retrace=parts.retrace,
     )

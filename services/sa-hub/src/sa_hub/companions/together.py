@@ -1,17 +1,16 @@
 """All companions of a hub as its settings want them; what is not wanted is not even imported."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Protocol
 
 from bootprint.bus import Envelope
-from bootprint.clock import NS_PER_S
 from bootprint.config import Member
-from bootprint.display import Ages
 from bootprint.errors import ConfigError
 from bootprint.figures import Figures
 from bootprint.messages import Fix
 from bootprint.service import Context
-from sa_hub.companions.worker import Sink, Worker
+from sa_hub.companions.worker import Fate, Promise, Sink, Worker
 from sa_hub.page.settings import PageSettings
 from sa_hub.settings import HubSettings
 
@@ -50,8 +49,17 @@ class Companions:
 
     def tell(self, envelopes: Iterable[Envelope]) -> None:
         """What the hub has heard of its own soldier, or says itself; never waits."""
+        self.entrust(envelopes)
+
+    def entrust(self, envelopes: Iterable[Envelope]) -> Promise:
+        """`tell`, and whether these are kept by those who keep."""
+        promises: list[Promise] = []
         for worker in self._workers:
-            worker.tell(envelopes)
+            if isinstance(worker, Worker):
+                promises.append(worker.entrust(envelopes))
+            else:
+                worker.tell(envelopes)
+        return partial(_fate_of_all, promises)
 
     def figures(self) -> Figures:
         """Everyone's counters and gauges, and what is wrong."""
@@ -67,6 +75,13 @@ class Companions:
         """Let everyone finish what waits."""
         for worker in self._workers:
             worker.close()
+
+
+def _fate_of_all(promises: Iterable[Promise]) -> Fate:
+    fates = {promise() for promise in promises}
+    if "waiting" in fates:
+        return "waiting"
+    return "unkept" if "unkept" in fates else "kept"
 
 
 def companions_of(context: Context, settings: HubSettings, announce: Announce, place: Place) -> Companions:
@@ -99,17 +114,13 @@ def _page(context: Context, settings: HubSettings, page: PageSettings, place: Pl
     from sa_hub.page.part import Page
 
     archive = None if settings.history is None else settings.history.archive(context.computer)
-    return Page(context, page, _ages(settings), place, archive)
-
-
-def _ages(settings: HubSettings) -> Ages:
-    return Ages(round(settings.stale_s * NS_PER_S), round(settings.lost_s * NS_PER_S))
+    return Page(context, page, settings.ages, place, archive)
 
 
 def _sinks(context: Context, settings: HubSettings, announce: Announce) -> Iterable[Sink]:
     computer = context.computer
     where = f"{computer.path}: [hub"
-    ages = _ages(settings)
+    ages = settings.ages
     if settings.history is not None:
         from sa_hub.history.sink import HistorySink
 

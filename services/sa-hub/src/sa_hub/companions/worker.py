@@ -3,8 +3,9 @@
 import queue
 import threading
 import time
-from collections.abc import Iterable
-from typing import Final, Protocol
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Final, Literal, Protocol
 
 import structlog
 
@@ -14,6 +15,11 @@ from bootprint.figures import Figures
 
 _RETRY_S: Final = 1.0
 _LEAVE_S: Final = 10.0
+
+Fate = Literal["waiting", "kept", "unkept"]
+"""What becomes of what somebody was told; ``unkept``: it may never be, and nobody is to wait for it."""
+Promise = Callable[[], Fate]
+"""Tells the fate by now, whenever asked."""
 
 
 class Sink(Protocol):
@@ -43,14 +49,20 @@ class Sink(Protocol):
 
 
 class Worker:
-    """Runs a sink. Counts what was taken, what found the queue full (``dropped``), and faults."""
+    """Runs a sink. Counts what was taken, what found the queue full (``dropped``), and faults.
+
+    Told by the hub's thread and by those of the bus: what is laid into the queue is counted in the same step, or a
+    promise would be of less than what lies before it.
+    """
 
     def __init__(self, sink: Sink, capacity: int = 20_000) -> None:
         self._sink = sink
         self._queue: queue.Queue[Envelope] = queue.Queue(capacity)
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name=sink.name, daemon=True)
+        self._telling = threading.Lock()
         self._taken = self._dropped = self._faults = 0
+        self._told = self._done = self._given_up = 0
         self._note = ""
 
     def start(self) -> None:
@@ -59,11 +71,35 @@ class Worker:
 
     def tell(self, envelopes: Iterable[Envelope]) -> None:
         """Lay what the sink wants into its queue; never waits."""
-        for envelope in filter(self._sink.wants, envelopes):
-            try:
-                self._queue.put_nowait(envelope)
-            except queue.Full:
-                self._dropped += 1
+        self.entrust(envelopes)
+
+    def entrust(self, envelopes: Iterable[Envelope]) -> Promise:
+        """`tell`, and whether these are kept. Who keeps nothing need not be waited for."""
+        with self._telling:
+            told, dropped, given_up = self._told, self._dropped, self._given_up
+            for envelope in filter(self._sink.wants, envelopes):
+                self._lay(envelope)
+            if not self._sink.keeps:
+                return lambda: "kept"
+            if self._dropped != dropped:
+                return lambda: "unkept"
+            return partial(self._fate, told, self._told, given_up)
+
+    def _lay(self, envelope: Envelope) -> None:
+        try:
+            self._queue.put_nowait(envelope)
+        except queue.Full:
+            self._dropped += 1
+        else:
+            self._told += 1
+
+    def _fate(self, begin: int, end: int, given_up: int) -> Fate:
+        """Of the envelopes after ``begin`` up to ``end``; unkept, too, if anything was given up since they came."""
+        if begin == end:
+            return "kept"
+        if self._done >= end:
+            return "kept" if self._given_up == given_up else "unkept"
+        return "unkept" if self._note else "waiting"
 
     def figures(self) -> Figures:
         """Counters and gauges under the sink's name; what is wrong as a note."""
@@ -84,13 +120,18 @@ class Worker:
         while not self._stopping.is_set() or not self._queue.empty():
             batch = batch or self._collect()
             if self._taken_by_sink(batch):
-                batch = []
+                batch = self._dispose(batch)
             elif self._stopping.is_set():
                 break
             else:
-                batch = batch if self._sink.keeps else []
+                batch = batch if self._sink.keeps else self._dispose(batch)
                 self._stopping.wait(_RETRY_S)
         self._sink.close()
+
+    def _dispose(self, batch: list[Envelope]) -> list[Envelope]:
+        """These are kept or given up."""
+        self._done += len(batch)
+        return []
 
     def _collect(self) -> list[Envelope]:
         """What comes within an interval, up to as many as the sink takes at once."""
@@ -115,6 +156,7 @@ class Worker:
             # A bug in what accompanies the hub must not end it: as in the scaffold, told and survived.
             self._faults += 1
             self._note = f"{self._sink.name}: a fault of the program, see the log"
+            self._given_up += len(batch)
             structlog.get_logger().exception("companion failed", companion=self._sink.name)
             return True
         self._taken += len(batch)

@@ -13,7 +13,7 @@ from sa_hub.page import answers, past
 from sa_hub.page.answers import Acknowledged, AuditRow, Fixed, PictureView, PostView
 from sa_hub.page.asking import Ask
 from sa_hub.page.desk import Desk
-from sa_hub.page.geojson import FeatureCollection
+from sa_hub.page.geojson import FeatureCollection, Trails
 from sa_hub.page.operations import NewAlert, NewFix, NewObservation, NewSighting, NewStatus
 from sa_hub.page.past import EventRange, ExportRange, History, Moment, Range
 from sa_hub.page.settings import Role
@@ -75,7 +75,7 @@ ENDPOINTS: Final = (
         "view",
         "Who went where in a time",
         past.past_trails,
-        FeatureCollection,
+        Trails,
         query=Range,
         slow=True,
     ),

@@ -6,11 +6,10 @@ from typing import Any, Literal
 
 import msgspec
 
-from bootprint.bus import Envelope
 from bootprint.display import Ages, shown
 from bootprint.geodesy import azimuth_of
 from bootprint.messages import Track
-from sa_hub.page.views import ObservationView, seconds
+from sa_hub.page.views import ObservationView, UtcSeconds, seconds
 
 _DIGITS = 8
 _STILL_M_S = 0.3
@@ -31,6 +30,12 @@ class FeatureCollection(msgspec.Struct, kw_only=True, frozen=True):
     features: list[Feature]
 
 
+class Trails(FeatureCollection, kw_only=True, frozen=True):
+    """Lines of what was asked for, but for what came at ``until_s`` or later: ask for that anew."""
+
+    until_s: UtcSeconds
+
+
 def soldiers(tracks: Iterable[Track], now_ns: int, ages: Ages) -> FeatureCollection:
     """Everybody where they are believed to be at ``now_ns``, with the circle that holds them with 95 %."""
     return FeatureCollection(features=[_soldier(track, now_ns, ages) for track in tracks])
@@ -49,13 +54,13 @@ def observations(views: Iterable[ObservationView]) -> FeatureCollection:
     return FeatureCollection(features=features)
 
 
-def trails(envelopes: Iterable[Envelope]) -> FeatureCollection:
-    """A line for each soldier through their reports, with their times and floors."""
+def trails(tracks: Iterable[Track], until_ns: int) -> Trails:
+    """A line for each soldier through their reports before ``until_ns``, with their times and floors."""
     found: dict[str, list[Track]] = {}
-    for envelope in envelopes:
-        if isinstance(envelope.message, Track):
-            found.setdefault(envelope.message.soldier, []).append(envelope.message)
-    return FeatureCollection(features=[_trail(soldier, tracks) for soldier, tracks in found.items()])
+    for track in tracks:
+        found.setdefault(track.soldier, []).append(track)
+    lines = [_trail(soldier, theirs) for soldier, theirs in found.items()]
+    return Trails(features=lines, until_s=seconds(until_ns))
 
 
 def _soldier(track: Track, now_ns: int, ages: Ages) -> Feature:

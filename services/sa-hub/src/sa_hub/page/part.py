@@ -15,6 +15,7 @@ from sa_hub.page.app import STATIC, build_app
 from sa_hub.page.audit import Audit
 from sa_hub.page.desk import Desk
 from sa_hub.page.operations import Post
+from sa_hub.page.restart import recall
 from sa_hub.page.server import PageServer
 from sa_hub.page.settings import PageSettings, check_page
 
@@ -57,9 +58,10 @@ class Page:
         return "" if (STATIC / "index.html").is_file() else "the page is not built: make page"
 
     def start(self) -> None:
-        """The bus is open: listen to everybody's health, serve."""
+        """The bus is open: listen to everybody's health, begin with what was known before a restart, serve."""
         realm = self._context.identity.realm
         self._health = self._context.bus.open_inlet(f"{realm}/{VERSION}/*/*/health/*")
+        recall(self.desk)
         self._server.start()
         self._context.log.info("page", address=self._server.address)
         if self.note:

@@ -12,11 +12,12 @@ import msgspec
 
 from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
+from bootprint.messages import Track
 from sa_hub.page import geojson
 from sa_hub.page.answers import PictureView
 from sa_hub.page.asking import Ask, Refused
 from sa_hub.page.desk import Desk
-from sa_hub.page.geojson import FeatureCollection
+from sa_hub.page.geojson import Trails
 from sa_hub.page.views import UtcSeconds, View, seconds, view_of
 
 if TYPE_CHECKING:
@@ -88,11 +89,13 @@ def past_picture(desk: Desk, ask: Ask) -> PictureView:
     return _picture_of(_archive(desk).picture_at(time_ns), time_ns)
 
 
-def past_trails(desk: Desk, ask: Ask) -> FeatureCollection:
-    """Lines of one soldier or all; no more than `MOST_POINTS` reports."""
+def past_trails(desk: Desk, ask: Ask) -> Trails:
+    """Lines of one soldier or all, of the earliest `MOST_POINTS` reports."""
     begin_ns, end_ns = _span_ns(ask)
     found = _archive(desk).messages("track", begin_ns, end_ns, ask.query.soldier)
-    return geojson.trails(islice(found, MOST_POINTS))
+    tracks = [each.message for each in islice(found, MOST_POINTS + 1) if isinstance(each.message, Track)]
+    until_ns = end_ns if len(tracks) <= MOST_POINTS else tracks.pop().time_ns
+    return geojson.trails(tracks, until_ns)
 
 
 def past_events(desk: Desk, ask: Ask) -> PictureView:

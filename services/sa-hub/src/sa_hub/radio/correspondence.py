@@ -6,6 +6,7 @@ urgent first; the net pays for it and seals it.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from bootprint.clock import NS_PER_S
@@ -36,7 +37,11 @@ class Station:
 
 
 class Correspondence:
-    """``known``: how many soldiers we know where they are, for the hub to set. ``regained``: contact came back."""
+    """``known``: how many soldiers we know where they are, for the hub to set. ``regained``: contact came back.
+
+    ``look``: in which of the hub's looks at what has come frames are heard now; what is heard after the look
+    ``kept_until`` is not yet to be acknowledged (None: everything is). Both are for the hub to set.
+    """
 
     def __init__(
         self, station: Station, full_headers: FullHeaders, decode: Callable[[int, bytes, int], Frame]
@@ -45,6 +50,8 @@ class Correspondence:
         self.outbox = Outbox(seed)
         self.answering = Answering(seed, relays=station.relays)
         self.known = 0
+        self.look = 0
+        self.kept_until: int | None = None
         self.regained = False
         self._station = station
         self._full_headers = full_headers
@@ -68,8 +75,7 @@ class Correspondence:
                 self._asked(frame.content, now_ns)
                 return None
             case Fragment():
-                self._owe(opened, frame, (frame.content.message, frame.content.index), now_ns)
-                return self._collected(opened.sender, frame.content, now_ns)
+                return self._collected(opened, frame, frame.content, now_ns)
             case Reports():
                 self._heard_reports(opened.sender, frame.content, now_ns)
                 return frame.content
@@ -86,7 +92,7 @@ class Correspondence:
     def _owe(self, opened: Opened, frame: Frame, what: object, now_ns: int) -> None:
         if frame.asked is not None and frame.asked.includes(self._station.number):
             by_name = bool(frame.asked.numbers)
-            self._answers.owe(opened.sender, what, opened.counter, now_ns, by_name=by_name)
+            self._answers.owe(opened.sender, what, opened.counter, now_ns, by_name=by_name, look=self.look)
 
     def _acknowledged(self, by: int, content: Acknowledgement) -> None:
         for sender, counted in content.heard:
@@ -105,11 +111,12 @@ class Correspondence:
         if others and 3 * others >= self.known:
             self.answering.heard_answer(now_ns)
 
-    def _collected(self, sender: int, fragment: Fragment, now_ns: int) -> Told | None:
-        payload = self._collector.add(sender, fragment, now_ns)
+    def _collected(self, opened: Opened, frame: Frame, part: Fragment, now_ns: int) -> Told | None:
+        owe = partial(self._owe, opened, frame, (part.message, part.index))
+        payload = self._collector.add((opened.sender, opened.epoch), part, now_ns, owe)
         if payload is None:
             return None
-        content = self._decode(sender, payload, now_ns).content
+        content = self._decode(opened.sender, payload, now_ns).content
         if not isinstance(content, ObservationNotice):
             raise FrameError("fragments", "only observations come in parts")
         return content
@@ -122,7 +129,7 @@ class Correspondence:
         self._asking.known = self.known
         return (
             self.outbox.due(now_ns, members, alerts_only=True)
-            or self._answers.due(now_ns)
+            or self._answers.due(now_ns, self.kept_until)
             or self._asking.due(now_ns)
             or self.outbox.due(now_ns, members)
         )

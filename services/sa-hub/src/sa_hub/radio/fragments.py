@@ -1,6 +1,8 @@
 """Payloads too long for a frame: cut by the sender, put together by the receiver, who keeps few, briefly."""
 
 from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 from typing import Final
 
 from bootprint.clock import NS_PER_S
@@ -27,35 +29,70 @@ class Cutter:
         return [Fragment(message, index, len(parts) - 1, part) for index, part in enumerate(parts)]
 
 
+@dataclass(slots=True)
+class _Collected:
+    """Parts of a payload by index, and how each is acknowledged."""
+
+    since_ns: int
+    parts: dict[int, bytes] = field(default_factory=dict)
+    acknowledge: dict[int, Callable[[int], None]] = field(default_factory=dict)
+
+
+_Key = tuple[Hashable, int, int]
+
+
 class Collector:
-    """Parts of others' payloads: at most 16 payloads at a time, 4 kB each, for two minutes."""
+    """Parts of others' payloads: at most 16 payloads at a time, 4 kB each, for two minutes.
+
+    Parts are acknowledged when all are there: who forgets them before that, killed perhaps, must get them again.
+    """
 
     def __init__(self) -> None:
-        self._parts: OrderedDict[tuple[int, int, int], tuple[int, dict[int, bytes]]] = OrderedDict()
+        self._begun: OrderedDict[_Key, _Collected] = OrderedDict()
+        self._whole: OrderedDict[_Key, int] = OrderedDict()
 
-    def add(self, sender: int, fragment: Fragment, now_ns: int) -> bytes | None:
-        """Keep a part; the whole payload when this was the last one missing."""
+    def add(
+        self, source: Hashable, fragment: Fragment, now_ns: int, acknowledge: Callable[[int], None]
+    ) -> bytes | None:
+        """Keep a part; the whole payload when this was the last one missing.
+
+        ``source``: its sender and their epoch, in which they number their payloads. ``acknowledge`` is called
+        with the time when the payload is whole, at once where it was before.
+        """
         self._forget_old(now_ns)
-        key = sender, fragment.message, fragment.last
-        _, parts = self._parts.setdefault(key, (now_ns, {}))
-        parts[fragment.index] = fragment.data
-        if len(parts) <= fragment.last:
+        key = source, fragment.message, fragment.last
+        if key in self._whole:
+            acknowledge(now_ns)
             return None
-        del self._parts[key]
-        return b"".join(parts[index] for index in range(fragment.last + 1))
+        begun = self._begun.setdefault(key, _Collected(now_ns))
+        begun.parts[fragment.index] = fragment.data
+        begun.acknowledge[fragment.index] = acknowledge
+        if len(begun.parts) <= fragment.last:
+            return None
+        del self._begun[key]
+        self._whole[key] = now_ns
+        for each in begun.acknowledge.values():
+            each(now_ns)
+        return b"".join(begun.parts[index] for index in range(fragment.last + 1))
 
     def set_back(self, by_ns: int) -> None:
         """The clock was set back by so much."""
-        for key, (since_ns, parts) in self._parts.items():
-            self._parts[key] = since_ns - by_ns, parts
+        for begun in self._begun.values():
+            begun.since_ns -= by_ns
+        for key in self._whole:
+            self._whole[key] -= by_ns
 
     def __len__(self) -> int:
-        return len(self._parts)
+        return len(self._begun)
 
     def _forget_old(self, now_ns: int) -> None:
         """Room for one more: the oldest go first."""
-        while self._parts:
-            since_ns, _ = next(iter(self._parts.values()))
-            if len(self._parts) < CAPACITY and now_ns - since_ns <= KEEP_NS:
-                return
-            self._parts.popitem(last=False)
+        while self._begun:
+            oldest = next(iter(self._begun.values()))
+            if len(self._begun) < CAPACITY and now_ns - oldest.since_ns <= KEEP_NS:
+                break
+            self._begun.popitem(last=False)
+        while self._whole:
+            if len(self._whole) < _MESSAGES and now_ns - next(iter(self._whole.values())) <= KEEP_NS:
+                break
+            self._whole.popitem(last=False)

@@ -1,4 +1,4 @@
-"""Frame payloads, version 2: contents to bits and back, absolute anchors only, never against an earlier frame.
+"""Frame payloads, version 3: contents to bits and back, absolute anchors only, never against an earlier frame.
 
 The tables of `layout` say where each bit stands, the functions of `quantise` bound every rounding. Decoding takes
 any bytes and either gives contents that make valid messages or raises `FrameError`.

@@ -2,7 +2,8 @@
 
 Feedback costs bits, so it goes to who speaks in updates of at least half as many soldiers as we do (a leader's own
 bits are worth more than what one soldier could save by them), and only at first, while some of their last frames
-were missed, or now and then after many, so that they learn how little is lost here. The first goes back as far as
+were missed, or now and then after many, so that they learn how little is lost here. Where bits are cheap it is
+given anew before what it proves is old: in a quiet net many frames are a long time. The first goes back as far as
 it can, each other one to the feedback before the last one, so one may be lost.
 """
 
@@ -10,22 +11,27 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
+from bootprint.clock import NS_PER_S
 from sa_hub.radio.content import Feedback
 from sa_hub.radio.feedback_codec import LONGEST_SPAN, SPAN_STEP
 from sa_hub.radio.replay import Heard
 
 _ENOUGH: Final = 24
+KEEPS_NS: Final = 30 * NS_PER_S
+"""Where bits are cheap feedback is given anew after so long: a report counts as fresh for longer."""
 
 
 @dataclass(slots=True)
 class _Told:
-    """Of a sender: its epoch, the counters told up to last and before, the first of use, whom it tells of."""
+    """Of a sender: its epoch, the counters told up to last and before, the first of use, whom it tells of, and when
+    it was told last."""
 
     epoch: int
     last: int
     before: int
     first: int
     soldiers: set[int] = field(default_factory=set)
+    at_ns: int = 0
 
 
 class Hearing:
@@ -43,13 +49,16 @@ class Hearing:
             )
         told.soldiers.update(soldiers)
 
-    def due(self, heard: Callable[[int], Heard | None], telling_of: int) -> Feedback | None:
+    def due(
+        self, heard: Callable[[int], Heard | None], telling_of: int, now_ns: int, *, cheap: bool = False
+    ) -> Feedback | None:
         """Feedback to the one who needs it most, if anyone does.
 
         ``heard`` gives what came of a sender; we tell of so many soldiers ourselves.
         """
+        old_ns = now_ns - KEEPS_NS
         needs = {
-            sender: self._need(told, heard(sender))
+            sender: self._need(told, heard(sender), aged=cheap and told.at_ns <= old_ns)
             for sender, told in self._told.items()
             if 2 * len(told.soldiers) >= telling_of
         }
@@ -59,12 +68,18 @@ class Hearing:
             return None
         return _feedback(sender, self._told[sender], newest)
 
-    def sent(self, feedback: Feedback) -> None:
+    def sent(self, feedback: Feedback, now_ns: int) -> None:
         """It was on the air."""
         told = self._told[feedback.about]
         told.before, told.last = told.last, feedback.newest
+        told.at_ns = now_ns
 
-    def _need(self, told: _Told, heard: Heard | None) -> int:
+    def set_back(self, by_ns: int) -> None:
+        """The clock was set back by so much."""
+        for told in self._told.values():
+            told.at_ns -= by_ns
+
+    def _need(self, told: _Told, heard: Heard | None, *, aged: bool) -> int:
         """How many of its newest frames are worth telling of, the more the more soldiers they tell of."""
         if heard is None or heard.epoch != told.epoch:
             return 0
@@ -72,7 +87,7 @@ class Hearing:
         seen = min(heard.highest - told.first + 1, LONGEST_SPAN)
         lossy = bool(~heard.mask & ((1 << seen) - 1))
         first = told.last < told.first
-        return new * len(told.soldiers) if new >= _ENOUGH or (new > 0 and (lossy or first)) else 0
+        return new * len(told.soldiers) if new >= _ENOUGH or (new > 0 and (lossy or first or aged)) else 0
 
 
 def _feedback(sender: int, told: _Told, heard: Heard) -> Feedback:

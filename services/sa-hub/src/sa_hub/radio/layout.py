@@ -1,4 +1,4 @@
-"""The frame's layout, version 2: tables of fields that the codec walks and the manual is generated from."""
+"""The frame's layout, version 3: tables of fields that the codec walks and the manual is generated from."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Final
 
 from sa_hub.radio.bits import BitReader, BitWriter
 
-VERSION: Final = 2
+VERSION: Final = 3
 EPOCH_BITS: Final = 30
 COUNTER_BITS: Final = 18
 COUNTER_LOW_BITS: Final = 3
@@ -71,7 +71,7 @@ def read_fields(reader: BitReader, fields: Iterable[Field], known: Mapping[str, 
 
 
 HEADER: Final = (
-    Field("version", 2, "2"),
+    Field("version", 2, str(VERSION)),
     Field("sender", 10, "the sending hub's number in the roster"),
     Field("full", 1, "1: epoch and the counter's high bits follow"),
     Field("counter_low", COUNTER_LOW_BITS, "the frame counter's low bits"),
@@ -166,6 +166,8 @@ LATTICES: Final = (
     *((1, reach) for reach in (5, 6, 8)),
 )
 """What places in updates are told on, by code: cells of 180°/2^26 · 2^first, modulo 2^second of them."""
+USUAL_LATTICES: Final = ((3, 3), (3, 4))
+"""Those of the usual update, by its bit `wide`."""
 MISSES: Final = (0, 1, 2, 3, 4, 6, 9, 14)
 """How many frames a receiver may have missed and still resolve an update, by code."""
 UPDATE: Final = (
@@ -195,7 +197,7 @@ UPDATE: Final = (
     Field("gap_code", 2, "g: the parameter of the gaps' Rice code is k = 2 g, else 0", _SPREAD),
 )
 _MOVES, _QUALITY, _LEVEL = ("moving", 1), ("quality", 1), ("level", 1)
-_VARIED = (("varied", 1),)
+_VARIED, _CHANGED = (("varied", 1),), (("changed", 1),)
 _SAME_REACH, _CLOSE, _FAR_OFF = (("varied", 0),), (*_VARIED, ("far", 0)), (*_VARIED, ("far", 1))
 _COLUMN, _ROW = "column of cells, low bits", "row of cells, low bits"
 NEAR_BITS, FAR_BITS = -1, 2
@@ -215,19 +217,18 @@ ENTRY: Final = (
     Field("direction", 4, "of motion, 1/16 turn clockwise from true north", (_MOVES,)),
     Field("pace", 2, "0.49, 0.81, 1.32, 2.16 m/s", (_MOVES, ("paced", 0))),
     Field("speed", 4, "0.3 m/s · 1.28^code", (_MOVES, ("paced", 1))),
-    Field(
-        "quality", 1, "1: accuracy, mode, hops and condition follow; 0: as told before", (("detailed", 1),)
-    ),
+    Field("changed", 1, "1: the next three follow, else they are 0", (("detailed", 1),)),
+    Field("quality", 1, "1: accuracy, mode, hops and condition follow; 0: as told before", _CHANGED),
     Field("accuracy", 3, _ACCURACY, (_QUALITY,)),
     Field("mode", 3, _MODE, (_QUALITY,)),
     Field("hops", 2, "relays passed, this transmission included if it is one", (_QUALITY,)),
     Field("condition", 2, "0 ok, 1 busy, 2 wounded, 3 out", (_QUALITY,)),
-    Field("level", 1, "1: floor and height follow; 0: as told before", (("detailed", 1),)),
+    Field("level", 1, "1: floor and height follow; 0: as told before", _CHANGED),
     Field("has_floor", 1, "1: floor is known", (_LEVEL,)),
     Field("floor", 7, "floor, from −32", (("has_floor", 1),)),
     Field("has_height", 1, "1: height is known", (_LEVEL,)),
     Field("height", 8, "m above the ellipsoid, low bits, nearest to what was told before", (_HEIGHT,)),
-    Field("turned", 1, "1: facing follows; 0: as told before", (("detailed", 1),)),
+    Field("turned", 1, "1: facing follows; 0: as told before", _CHANGED),
     Field("has_facing", 1, "1: facing is known", (("turned", 1),)),
     Field("facing", 4, _FACING, (("has_facing", 1),)),
 )

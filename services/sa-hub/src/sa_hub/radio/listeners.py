@@ -65,7 +65,7 @@ class Listeners:
 
     @property
     def all_tell(self) -> bool:
-        """Whether every receiver does that was heard of late, and there is one."""
+        """Whether every receiver does that was heard within 5 min of the time passed, and there is one."""
         return self.tell and self._heard_ns.keys() <= self._listeners.keys()
 
     def widen(self, slots: int) -> None:
@@ -137,6 +137,13 @@ class Listeners:
         known.counter = max(known.counter, newest)
         self._drop_silent(now_ns)
         self._deal()
+
+    def pass_time(self, now_ns: int) -> None:
+        """Event time is ``now_ns``: who fell silent no longer counts, though nobody else says anything either."""
+        before = len(self._listeners), self.all_tell
+        self._drop_silent(now_ns)
+        if (len(self._listeners), self.all_tell) != before:
+            self._deal()
 
     def _newest(self, feedback: Feedback) -> int:
         """The whole counter of which feedback tells the low bits."""

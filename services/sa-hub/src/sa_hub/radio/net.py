@@ -159,6 +159,7 @@ class RadioNet:
         self._bucket.refused = False
         self._bucket.fill(now_ns)
         self._sealer.full_headers.ample = self._bucket.free_bits > _AMPLE * self._bucket.depth_bits
+        self._sealer.full_headers.known = self.scheduler.listeners.all_tell
         try:
             if self._speak_notices(frames, now_ns):
                 self._speak_reports(frames, candidates, now_ns)
@@ -179,18 +180,19 @@ class RadioNet:
         return True
 
     def _speak_reports(self, frames: list[bytes], candidates: Sequence[Report], now_ns: int) -> None:
-        if not self.scheduler.is_due(now_ns):
+        scheduler = self.scheduler
+        if not scheduler.is_due(now_ns):
             return
-        self.scheduler.pass_time(self._room(now_ns), now_ns)
+        scheduler.pass_time(self._room(now_ns), len(candidates), now_ns)
         if self._sealer.next_epoch() != self._epoch:
             # Receivers resolve updates by frames of the same epoch alone.
             self._epoch = self._sealer.next_epoch()
-            self.scheduler.begin_again()
+            scheduler.begin_again()
         for _ in range(_MOST_FRAMES_AT_ONCE):
-            plan = self.scheduler.plan(candidates, self._room(now_ns), now_ns, urged=self._reception.urged)
+            plan = scheduler.plan(candidates, self._room(now_ns), now_ns, urged=self._reception.urged)
             if plan is None:
                 return
-            feedback = self._reception.feedback(self.scheduler.telling_of)
+            feedback = self._reception.feedback(scheduler.telling_of, now_ns, cheap=scheduler.is_cheap)
             plan = self._fitting(replace(plan, feedback=feedback))
             frame = self._transmit(plan, now_ns)
             if frame is None:

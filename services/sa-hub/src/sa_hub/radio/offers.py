@@ -12,17 +12,23 @@ import numpy as np
 
 from sa_hub.radio.ground import FloatArray
 from sa_hub.radio.history import allowed_cells
-from sa_hub.radio.layout import FAR_BITS, LATTICES, MISSES, NEAR_BITS
+from sa_hub.radio.layout import FAR_BITS, LATTICES, MISSES, NEAR_BITS, USUAL_LATTICES
 from sa_hub.radio.picture import BoolArray, IntArray
 from sa_hub.radio.squad import MAX_SOLDIERS
 from sa_hub.radio.update_codec import MAX_ENTRIES
 
-UPDATE_HEAD_BITS: Final = 28
+UPDATE_HEAD_BITS: Final = 26.5
+"""Of a usual update, and the half byte that is filled up on the average."""
+_UNUSUAL_BITS: Final = 10.0
+"""What the head of an update takes more that is not usual."""
+_DETAILED_BITS: Final = 3.0
+"""What it takes more where details have changed; each entry takes a bit more then, too."""
 SQUAD_HEAD_BITS: Final = 80
 MOTION_BITS: Final = 6
-LEAST_ENTRY_BITS: Final = 8.0
+LEAST_ENTRY_BITS: Final = 2.0 * (min(reach for _, reach in LATTICES) + NEAR_BITS) + 2.0
+"""Of a steady entry in a frame that varies: its place by the narrowest modulus, and how it is told."""
 RESOLUTIONS: Final = tuple(sorted({resolution for resolution, _ in LATTICES}))
-_GAP_BITS: Final = 2
+_RICE_PARAMETERS: Final = (0, 2, 4, 6)
 _SQUAD_ENTRY_BITS: Final = 8
 
 
@@ -56,7 +62,8 @@ class Wares:
 
     ``bits`` (n,) beside the place, ``velocity_bits`` of them need not be told where ``steady`` (n, DEPTH) holds for
     all that may be missed; ``changes_bits`` (n, DEPTH) of what has changed, by how much may be missed;
-    ``off_cells`` (n, DEPTH) see `History.cells_off`; ``span_cells``: how far the soldiers lie apart.
+    ``off_cells`` (n, DEPTH) see `History.cells_off`; ``span_cells``: how far the soldiers lie apart; ``span``: how
+    far their numbers do.
     """
 
     worth: FloatArray
@@ -68,6 +75,7 @@ class Wares:
     off_cells: FloatArray
     refresh: FloatArray
     span_cells: float
+    span: int
     resolution: int
 
 
@@ -116,7 +124,8 @@ class Offer:
 
 def may_pay(gain: FloatArray, terms: Terms) -> bool:
     """Whether any frame could: a quick look, since most of the time none does."""
-    return float(np.maximum(gain - terms.price * LEAST_ENTRY_BITS, 0.0).sum()) > terms.frame_price
+    least_price = terms.entry_share * terms.price * LEAST_ENTRY_BITS
+    return float(np.maximum(gain - least_price, 0.0).sum()) > terms.frame_price
 
 
 def best_offer(wares: Wares, terms: Terms) -> Offer | None:
@@ -139,8 +148,9 @@ def _update(wares: Wares, terms: Terms, misses: int, *, varied: bool) -> Offer:
     """The best modulus for an update that allows so much to be missed."""
     gain = terms.delivered * np.where(wares.behind <= misses, wares.worth, 0.0).mean(axis=0)
     reaches, allowed = _REACHES[wares.resolution], _ALLOWED[wares.resolution]
-    off_cells = wares.off_cells[:, misses]
-    bits = _GAP_BITS + wares.bits + wares.changes_bits[:, misses]
+    off_cells, changes_bits = wares.off_cells[:, misses], wares.changes_bits[:, misses]
+    gap_bits, span_bits = _number_bits(wares.span, int(np.count_nonzero(gain > 0.0)))
+    bits = gap_bits + wares.bits + changes_bits
     steady, far = wares.steady[:, misses], off_cells >= allowed.near[:, None]
     if varied:
         resolvable = off_cells < allowed.far[:, None]
@@ -149,14 +159,30 @@ def _update(wares: Wares, terms: Terms, misses: int, *, varied: bool) -> Offer:
     else:
         resolvable = off_cells < allowed.usual[:, None]
         bits = bits + 2.0 * reaches[:, None]
+    usual = _usual(wares.resolution, reaches) & (misses == 0 and not varied)
+    head_bits = UPDATE_HEAD_BITS + span_bits + _UNUSUAL_BITS * ~usual
     surplus = np.where(resolvable, gain - terms.entry_share * terms.price * bits, -1.0)
-    totals = np.maximum(surplus, 0.0).sum(axis=1)
+    totals = np.maximum(surplus, 0.0).sum(axis=1) - terms.price * head_bits
     best = int(np.argmax(totals))
-    picked = _picked(surplus[best], bits[best], terms.room_bits - UPDATE_HEAD_BITS, MAX_ENTRIES)
-    size = UPDATE_HEAD_BITS + float(bits[best][picked].sum())
-    total = float(surplus[best][picked].sum()) - terms.frame_price - terms.price * UPDATE_HEAD_BITS
+    plain = float(head_bits[best])
+    heads = plain, plain + _DETAILED_BITS + _UNUSUAL_BITS * bool(usual[best])
+    picked, head = _picked_for_update(surplus[best], bits[best], changes_bits > 0.0, heads, terms.room_bits)
+    total = float(surplus[best][picked].sum()) - terms.frame_price - terms.price * head
+    size = head + float(bits[best][picked].sum())
     variation = (far[best], steady) if varied else (None, None)
     return Offer(total if len(picked) else -1.0, picked, size, int(reaches[best]), misses, *variation)
+
+
+def _usual(resolution: int, reaches: IntArray) -> BoolArray:
+    """(R,) whether the lattice is one that a usual update can have."""
+    return np.array([(resolution, reach) in USUAL_LATTICES for reach in reaches.tolist()], dtype=np.bool_)
+
+
+def _number_bits(span: int, picked: int) -> tuple[float, float]:
+    """What telling so many numbers out of a span takes: for each one more, and for all, whoever they are."""
+    costs = {k: picked * (1 + k) + (span - picked) / 2**k for k in _RICE_PARAMETERS}
+    k = min(costs, key=lambda each: costs[each])
+    return 1 + k - 0.5**k, span / 2**k
 
 
 def _in_full(wares: Wares, terms: Terms) -> Offer:
@@ -168,6 +194,18 @@ def _in_full(wares: Wares, terms: Terms) -> Offer:
     picked = _picked(surplus, bits, terms.room_bits - SQUAD_HEAD_BITS, MAX_SOLDIERS)
     total = float(surplus[picked].sum()) - terms.frame_price - terms.price * SQUAD_HEAD_BITS
     return Offer(total if len(picked) else -1.0, picked, SQUAD_HEAD_BITS + float(bits[picked].sum()))
+
+
+def _picked_for_update(
+    surplus: FloatArray, bits: FloatArray, changed: BoolArray, heads: tuple[float, float], room_bits: float
+) -> tuple[IntArray, float]:
+    """Who goes along in an update, and the bits of its head: the first of ``heads``, or where details of anybody
+    have ``changed`` the second and a bit for each entry."""
+    plain, detailed = heads
+    picked = _picked(surplus, bits, room_bits - plain, MAX_ENTRIES)
+    if changed[picked].any():
+        picked = _picked(surplus, bits + 1.0, room_bits - detailed, MAX_ENTRIES)
+    return picked, detailed + len(picked) if changed[picked].any() else plain
 
 
 def _picked(surplus: FloatArray, bits: FloatArray, room_bits: float, most: int) -> IntArray:

@@ -19,6 +19,9 @@ CAPACITY: Final = 32
 NAMED_FROM: Final = 3
 """From this time on those who are still missing are asked by name, so that the others need not answer again."""
 _COUNTERS_KEPT: Final = 16
+_SPAN: Final = 1 << COUNTED_BITS
+_LATELY: Final = _SPAN // 2
+"""Frames: an acknowledgement is of one among so many, or its bits might be those of an older one."""
 _JITTER: Final = 0.2
 
 Key = tuple[str, int, int, str]
@@ -84,6 +87,7 @@ class Outbox:
     def __init__(self, seed: str) -> None:
         self._waiting: list[_Waiting] = []
         self._random = random.Random(seed)
+        self._newest = 0
         self.dropped = 0
         self.given_up = 0
 
@@ -111,7 +115,8 @@ class Outbox:
     def acknowledged(self, by: int, counted: int) -> None:
         """Somebody has heard our frame with these low bits of its counter."""
         for waiting in self._waiting:
-            if counted in waiting.counters:
+            lately = (each for each in waiting.counters if self._newest - each < _LATELY)
+            if any(each % _SPAN == counted for each in lately):
                 waiting.acknowledged.add(by)
 
     def set_back(self, by_ns: int) -> None:
@@ -122,8 +127,11 @@ class Outbox:
 
     def _sending(self, waiting: _Waiting, members: Collection[int]) -> Sending:
         def sent(now_ns: int, counter: int) -> None:
+            if counter <= self._newest:
+                self._epoch_begins()
             waiting.times += 1
-            waiting.counters.append(counter % (1 << COUNTED_BITS))
+            waiting.counters.append(counter)
+            self._newest = counter
             pause_s = waiting.pause_s * self._random.uniform(1.0 - _JITTER, 1.0 + _JITTER)
             waiting.due_ns = now_ns + round(pause_s * NS_PER_S)
             waiting.pause_s *= waiting.persistence.growth
@@ -133,6 +141,11 @@ class Outbox:
         missing = waiting.missing(members)
         named = waiting.times + 1 >= NAMED_FROM and len(missing) <= MOST_ASKED
         return Sending(waiting.parcel, sent, Asked(tuple(missing) if named else ()))
+
+    def _epoch_begins(self) -> None:
+        """Counters have begun again: acknowledgements from now on are of the new ones."""
+        for waiting in self._waiting:
+            waiting.counters.clear()
 
     def _settle(self, now_ns: int, members: Collection[int]) -> None:
         """Forget what has arrived or what was said once, and give up what was repeated long enough."""

@@ -14,7 +14,7 @@ from sa_hub.radio.ground import METRES_PER_DEG, FloatArray, cosines, turn_deg
 from sa_hub.radio.picture import IntArray, widened
 
 MEMORY_S: Final = 30.0
-LEAST_SHARE: Final = 0.5
+LEAST_SHARE: Final = 0.8
 LONGEST_S: Final = 8
 """Ways are compared over as long as reports are apart, up to this."""
 _SAMPLE_S: Final = 1.0

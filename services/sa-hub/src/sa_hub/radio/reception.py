@@ -41,25 +41,26 @@ class Reception:
         self._hearing.heard_telling(sender, epoch, counter, (entry.number for entry in content.entries))
         return Reports(self._references.resolve(sender, epoch, counter, content, now_ns))
 
-    def feedback(self, telling_of: int) -> Feedback | None:
+    def feedback(self, telling_of: int, now_ns: int, *, cheap: bool) -> Feedback | None:
         """What a report that goes now should take along; we tell of so many soldiers ourselves."""
-        return self._hearing.due(self._references.in_order, telling_of)
+        return self._hearing.due(self._references.in_order, telling_of, now_ns, cheap=cheap)
 
     def lone_feedback(self, telling_of: int, now_ns: int) -> Feedback | None:
-        """What is to go in a frame of its own now."""
+        """What is to go in a frame of its own now: not what is only kept fresh."""
         if not self._lone.looks(now_ns):
             return None
-        feedback = self.feedback(telling_of)
+        feedback = self.feedback(telling_of, now_ns, cheap=False)
         is_due = self._lone.is_due(now_ns, waiting=feedback is not None, telling=telling_of > 0)
         return feedback if is_due else None
 
     def fed_back(self, feedback: Feedback, now_ns: int, *, alone: bool) -> None:
         """This was on the air."""
-        self._hearing.sent(feedback)
+        self._hearing.sent(feedback, now_ns)
         self._lone.sent(now_ns, alone=alone)
         self._unresolved_told = self.unresolved
 
     def set_back(self, by_ns: int) -> None:
         """The clock was set back by so much: what was told is of another time."""
         self._references.clear()
+        self._hearing.set_back(by_ns)
         self._lone.set_back(by_ns)

@@ -1,7 +1,8 @@
 """Telling in full again: for whoever can resolve nothing of a soldier, and does not say so.
 
-The first times soon, since a first frame may be missed, then after ever longer pauses. Where bits are dear one such
-frame takes what several updates need; where all say that they miss next to nothing the first time then comes later.
+The first times soon, since a first frame may be missed, then after ever longer pauses. One such frame takes what
+several updates need, so it takes no more than a share of the budget, and where all say what they hear, so that
+little is left to chance, the longest pause is the first.
 """
 
 from collections.abc import Iterable
@@ -13,6 +14,7 @@ from bootprint.clock import NS_PER_S
 from sa_hub.radio.content import Report
 from sa_hub.radio.ground import FloatArray
 from sa_hub.radio.listeners import LOSSLESS, Listeners
+from sa_hub.radio.room import Room
 from sa_hub.radio.wares import Candidates
 
 _WORTH: Final = 5.0
@@ -22,12 +24,12 @@ _LIMITS_S: Final = (60.0, 600.0)
 _FIRST_S: Final = (5.0, 1.0)
 _OVERDUE_S: Final = 20.0
 _CHEAP_PAUSE_S: Final = 15.0
-_DEAR: Final = 8.0
-"""Times what telling all in full takes of the budget is the first pause, where that is longer."""
+_SELDOM: Final = 3.0
+"""Times what telling all in full takes of the budget are the first and the longest pause at least."""
 _OLD_NS: Final = 10 * NS_PER_S
 
 
-def longest_pause_s(listeners: Listeners, *, cheap: bool) -> float:
+def _longest_pause_s(listeners: Listeners, *, cheap: bool) -> float:
     """Between two frames in full of a soldier: the longer the less is lost, or if all say what they heard."""
     if cheap:
         return _CHEAP_PAUSE_S
@@ -52,13 +54,12 @@ class Refreshing:
         self._full_ns.clear()
 
     def worth(
-        self, who: Candidates, now_ns: int, longest_s: float, full_s: float, *, cheap: bool
+        self, who: Candidates, now_ns: int, listeners: Listeners, room: Room, *, cheap: bool
     ) -> FloatArray:
-        """(n,) of telling in full again; of an old report nothing, it will be told when it is newer.
-
-        ``full_s``: for how long telling all in full takes the whole budget.
-        """
-        first_s, longest_s = (max(pause_s, _DEAR * full_s) for pause_s in (_FIRST_S[cheap], longest_s))
+        """(n,) of telling in full again; of an old report nothing, it will be told when it is newer."""
+        least_s = _SELDOM * room.full_s(len(who.reports))
+        longest_s = max(_longest_pause_s(listeners, cheap=cheap), least_s)
+        first_s = longest_s if listeners.all_tell else max(_FIRST_S[cheap], least_s)
         overdue = [
             self._overdue(number, now_ns, first_s, longest_s) * (now_ns - report.time_ns < _OLD_NS)
             for number, report in zip(who.numbers, who.reports, strict=True)

@@ -23,11 +23,11 @@ from sa_hub.radio.layout import MISSES
 from sa_hub.radio.listeners import LOSSLESS, Listeners
 from sa_hub.radio.offers import MOTION_BITS, RESOLUTIONS, Terms, Wares, best_offer, may_pay
 from sa_hub.radio.outlook import Outlook
-from sa_hub.radio.pacing import Pacing
+from sa_hub.radio.pacing import Pacing, usual_level
 from sa_hub.radio.persistence import LONGEST_S, Persistence
 from sa_hub.radio.picture import BoolArray, Spoken
 from sa_hub.radio.references import resolved
-from sa_hub.radio.refreshing import Refreshing, longest_pause_s
+from sa_hub.radio.refreshing import Refreshing
 from sa_hub.radio.relevance import Relevance
 from sa_hub.radio.room import Room
 from sa_hub.radio.telling import FRESH_NS, Telling
@@ -184,13 +184,15 @@ class Scheduler:
         """Whether it is time to decide again."""
         return self._planned_ns is None or now_ns - self._planned_ns >= PERIOD_NS
 
-    def pass_time(self, room: Room, now_ns: int) -> None:
-        """It is decided now: the price of bits follows the budget."""
+    def pass_time(self, room: Room, soldiers: int, now_ns: int) -> None:
+        """It is decided now: the price of bits follows the budget and how many soldiers there are to tell of."""
         elapsed_s = _LONGEST_ELAPSED_S
         if self._planned_ns is not None:
             elapsed_s = min((now_ns - self._planned_ns) / NS_PER_S, _LONGEST_ELAPSED_S)
         self._planned_ns = now_ns
-        self._pacing.passed(elapsed_s, room.free_bits / room.depth_bits)
+        self.listeners.pass_time(now_ns)
+        usual = usual_level(room, soldiers, ENOUGH * self._policy.threshold_m)
+        self._pacing.passed(elapsed_s, room.free_bits / room.depth_bits, usual)
 
     def plan(
         self, candidates: Sequence[Report], room: Room, now_ns: int, *, urged: bool = False
@@ -279,12 +281,13 @@ class Scheduler:
         velocity = np.where(np.hypot(*velocity.T)[:, None] < STANDING_M_S, 0.0, velocity)
         if self.listeners.loss >= LOSSLESS:
             velocity = self._history.as_told(slots, velocity)
-        faces: BoolArray = (velocity == 0.0).all(axis=1) & self._is_cheap
+        faces: BoolArray = (velocity == 0.0).all(axis=1) & self.is_cheap
         outlook = Outlook(who, velocity, min(room.interval_s(len(reports)), LONGEST_S))
         return Telling(outlook, faces, self._resolution(), now_ns, self._history, self._grid)
 
     @property
-    def _is_cheap(self) -> bool:
+    def is_cheap(self) -> bool:
+        """Whether bits are."""
         return self._pacing.price < CHEAP[0]
 
     def _resolution(self) -> int:
@@ -304,11 +307,8 @@ class Scheduler:
         return weighted
 
     def _refresh(self, telling: Telling, room: Room) -> FloatArray:
-        """(n,) the worth of telling in full again; where all say that they miss next to nothing it is put off."""
-        pause_s = longest_pause_s(self.listeners, cheap=self._is_cheap)
-        heard = self.listeners.all_tell and self.listeners.loss < LOSSLESS
-        full_s = room.full_s(len(telling.who.reports)) if heard else 0.0
-        return self._refreshing.worth(telling.who, telling.now_ns, pause_s, full_s, cheap=self._is_cheap)
+        """(n,) the worth of telling in full again."""
+        return self._refreshing.worth(telling.who, telling.now_ns, self.listeners, room, cheap=self.is_cheap)
 
     def _wares(self, telling: Telling, value: FloatArray, refresh: FloatArray) -> Wares:
         who = telling.who
@@ -325,6 +325,7 @@ class Scheduler:
             off_cells=np.where(telling.out_of_reach()[:, None], np.inf, off_cells),
             refresh=refresh,
             span_cells=who.span_m() / q.cell_m(telling.resolution),
+            span=max(who.numbers) - min(who.numbers),
             resolution=telling.resolution,
         )
 
@@ -337,7 +338,7 @@ class Scheduler:
             room_bits=room.payload_bits,
             delivered=1.0 if loss < LOSSLESS else 1.0 - loss,
             entry_share=1.0 if loss < LOSSLESS else LOSSY_SHARE,
-            least_misses=max(certain, _CHEAP_MISSES) if self._is_cheap else certain,
+            least_misses=max(certain, _CHEAP_MISSES) if self.is_cheap else certain,
         )
 
 

@@ -40,16 +40,19 @@ class Opened:
 class FullHeaders:
     """When epoch and counter travel in full: at once, then after 1 s, 2 s, 4 s, … and at last every 2 min.
 
-    ``ample``: bits are plenty, so that every frame may carry them and nobody has to wait.
+    ``ample``: bits are plenty, so that every frame may carry them and nobody has to wait. ``known``: everybody who
+    was heard says what it hears of us, so it knows the counter; then they come every 2 min at once, until somebody
+    asks: whoever does was not among them, and the row begins anew.
     """
 
     def __init__(self) -> None:
         self.ample = False
+        self.known = False
         self.begin()
 
     def begin(self) -> None:
         """There may be somebody who does not know the counter."""
-        self._due_ns: int | None = None
+        self._sent_ns: int | None = None
         self._pause_ns = FULL_FIRST_PAUSE_NS
         self._asked_ns: int | None = None
 
@@ -64,20 +67,24 @@ class FullHeaders:
         return self.ample or self._has_come(now_ns)
 
     def _has_come(self, now_ns: int) -> bool:
-        return self._due_ns is None or now_ns >= self._due_ns
+        seldom = self.known and self._asked_ns is None
+        pause_ns = FULL_LONGEST_PAUSE_NS if seldom else self._pause_ns
+        return self._sent_ns is None or now_ns - self._sent_ns >= pause_ns
 
     def sent(self, now_ns: int) -> None:
         """One was on the air; one that only ampleness sent moves nothing."""
         if not self._has_come(now_ns):
             return
-        self._due_ns = now_ns + self._pause_ns
-        self._pause_ns = min(2 * self._pause_ns, FULL_LONGEST_PAUSE_NS)
+        if self._sent_ns is not None:
+            self._pause_ns = min(2 * self._pause_ns, FULL_LONGEST_PAUSE_NS)
+        self._sent_ns = now_ns
 
     def set_back(self, by_ns: int) -> None:
         """The clock was set back by so much."""
-        if self._due_ns is not None:
-            self._due_ns -= by_ns
-        self._asked_ns = None
+        if self._sent_ns is not None:
+            self._sent_ns -= by_ns
+        if self._asked_ns is not None:
+            self._asked_ns -= by_ns
 
 
 class Sealer:

@@ -21,11 +21,13 @@ from sa_hub.radio.wares import Candidates
 FRESH_NS: Final = 2 * NS_PER_S
 """A report that is younger is told as of the frame's time, moved on; an older one with its age."""
 _FASTEST_ON_FOOT: Final = 9
+_CHANGED_BITS: Final = 3
+"""Which details have changed, told of who has any."""
 _QUALITY_BITS: Final = 10
-_LEVEL_BITS: Final = 3
+_LEVEL_BITS: Final = 2
 _FLOOR_BITS: Final = 7
 _HEIGHT_BITS: Final = 8
-_FACING_BITS: Final = 6
+_FACING_BITS: Final = 5
 _LEVEL_REPEATS: Final = 2
 """Entries in which a new level or facing is told at least; who misses them all has the old one until the next in
 full."""
@@ -99,8 +101,9 @@ class Telling:
             )
             for each in self.who.reports
         ]
-        bits: FloatArray = (self.changes() * np.array(widths, dtype=np.float64)[:, None, :]).sum(axis=2)
-        return bits
+        changes = self.changes()
+        bits: FloatArray = (changes * np.array(widths, dtype=np.float64)[:, None, :]).sum(axis=2)
+        return bits + _CHANGED_BITS * changes.any(axis=2)
 
     def urgent(self) -> BoolArray:
         """(n,) whether floor or condition is other than last told."""

@@ -20,6 +20,7 @@ from sa_hub.radio.layout import (
     NEAR_BITS,
     NEAR_REACH,
     UPDATE,
+    USUAL_LATTICES,
     read_fields,
     write_fields,
 )
@@ -32,7 +33,7 @@ HEIGHT_MODULUS: Final = 1 << 8
 _GAP_CODES: Final = 4
 
 _LEAST_ENTRY: Final = 7
-_USUAL: Final = tuple(LATTICES.index(lattice) for lattice in ((3, 3), (3, 4)))
+_USUAL: Final = tuple(LATTICES.index(lattice) for lattice in USUAL_LATTICES)
 
 _DEFAULTS: Final = dict.fromkeys(
     ("misses", "paced", "detailed", "aged", "varied", "gap_code", "far", "steady"), 0
@@ -111,7 +112,7 @@ def _reaches(reach: int) -> dict[str, int]:
 def _frame_values(update: Update, numbers: Sequence[int], sender: int) -> dict[str, int]:
     beside = numbers[0] - sender + _BESIDE
     paced = any(entry.velocity and entry.velocity[1] not in q.PACES for entry in update.entries)
-    detailed = any(entry.quality or entry.level or entry.facing for entry in update.entries)
+    detailed = any(_changed(entry) for entry in update.entries)
     aged = any(entry.age_ticks for entry in update.entries)
     plain = not (paced or detailed or aged)
     gap_code = best_gap_code(numbers)
@@ -154,6 +155,7 @@ def _entry_values(entry: Entry, reach_bits: int, *, paced: bool) -> dict[str, in
         "direction": direction,
         "pace": 0 if paced or entry.velocity is None else q.PACES.index(speed),
         "speed": speed,
+        "changed": int(_changed(entry)),
         "quality": int(entry.quality is not None),
         "accuracy": quality.accuracy,
         "mode": quality.mode,
@@ -168,6 +170,10 @@ def _entry_values(entry: Entry, reach_bits: int, *, paced: bool) -> dict[str, in
         "has_facing": int(facing is not None),
         "facing": facing or 0,
     }
+
+
+def _changed(entry: Entry) -> bool:
+    return entry.quality is not None or entry.level is not None or entry.facing is not None
 
 
 def _first_number(frame: Values, sender: int) -> int:

@@ -12,7 +12,7 @@ from sa_hub.radio.content import Report
 from sa_hub.radio.ground import METRES_PER_DEG, FloatArray, cosines, turn_deg
 from sa_hub.radio.picture import IntArray
 
-BRIEF_S: Final = 2.0
+BRIEF_S: Final = 1.5
 """Time constant of a velocity that does not last: of legs in a building."""
 
 

@@ -50,6 +50,8 @@ class NmeaDecoder:
         """Take one checked sentence; the fixes (none or one) that it completes."""
         try:
             message = NMEAReader.parse(frame)
+            if message is None:  # a checked sentence that the library makes nothing of, and says no more
+                raise nmea.NMEAParseError
             if message.msgID in _OF_EPOCH:
                 return self._take(message.msgID, message, received_ns)
             self._note(message)

@@ -59,6 +59,11 @@ def look_at(image: Image) -> Look:
     return Look(float(image.mean()), float(small.std()), noise_grey)
 
 
+def sharpness_of(image: Image) -> float:
+    """How much fine structure an evened image has: of one view it falls when the view is blurred."""
+    return float(cv2.Laplacian(image, cv2.CV_32F).std())
+
+
 def condition_of(look: Look, median_depth_m: float | None, agreeing_share: float | None) -> Condition:
     """Why no motion was found, the plainest reason first."""
     if look.is_dark:

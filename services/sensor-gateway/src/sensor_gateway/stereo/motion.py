@@ -5,6 +5,9 @@ A pose maps points of the key frame into the camera's axes now: ``q = R p + t``.
 noise and the point's own covariance seen through the camera: ``S = σ² I + J R Σ Rᵀ Jᵀ``. Weights are those of a
 Student distribution, so that what moves by itself hardly pulls (Lange, Little and Taylor 1989).
 
+How far off sights are is a guess of good cameras. Where a shutter rolls, a lens distorts or the view is blurred
+all are off by more, and a gate for good ones would call the room a crowd: so the median of what is left scales all.
+
 A landmark's doubt is kept in the space of sights, where it is the same near and far. As a covariance of places it
 would be small where noise has put a point too near, and means weighted by it would shorten every motion.
 """
@@ -23,6 +26,10 @@ _RANSAC_PX, _RANSAC_ROUNDS, _RANSAC_SURE = 3.0, 300, 0.999
 _STUDENT = 5.0
 _GATE = 16.3  # chi-square of three numbers, 0.999
 _ROUNDS, _SETTLED = 12, 1e-7
+_USUAL, _MOST_SCALE = (
+    0.77,
+    16.0,
+)  # median of chi-square by its numbers, two or three; and how bad sights may be
 _NEAREST_M = 0.05
 _LEAST_POINTS = 6
 _KEPT_DOUBT, _BLIND_PX2 = 1.5, 1e8
@@ -55,12 +62,16 @@ class Landmarks:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """``q = R p + t``, with the covariance (6, 6) of (δθ, δt) and which landmarks agree (n,)."""
+    """``q = R p + t``, with the covariance (6, 6) of (δθ, δt) and which landmarks agree (n,).
+
+    ``scale``: how many times as large as expected the sights' variances were.
+    """
 
     rotation: Rotation
     translation: FloatArray
     covariance: FloatArray
     agree: BoolArray
+    scale: float = 1.0
 
     @classmethod
     def none(cls) -> "Pose":
@@ -146,18 +157,19 @@ def _refined(
     problem = _linearised(calibration, landmarks, sights, sigma_px, pose, shifts)
     if problem is None:
         return None
-    agree = problem.squared < _GATE
+    agree = problem.squared < _GATE * problem.scale
     if agree.sum() < _LEAST_POINTS:
         return None
     spread = max(1.0, float(np.mean(problem.squared[agree] / problem.numbers[agree])))
     covariance: FloatArray = np.linalg.inv(problem.information).astype(np.float64)
-    return Pose(pose.rotation, pose.translation, spread * covariance, agree)
+    return Pose(pose.rotation, pose.translation, spread * covariance, agree, problem.scale)
 
 
 @dataclass(frozen=True, slots=True)
 class _Problem:
     """Normal equations of the pose, (6, 6) and (6,), and by landmark (n): the residual (n, 3), squared in units of
-    its covariance, how many numbers it is of, its derivative by the pose, and the gain for the landmark's place."""
+    its covariance, how many numbers it is of, its derivative by the pose, and the gain for the landmark's place.
+    ``scale``: of all covariances, by what is left of all."""
 
     information: FloatArray
     gradient: FloatArray
@@ -166,10 +178,11 @@ class _Problem:
     numbers: FloatArray
     by_pose: FloatArray
     gain: FloatArray
+    scale: float
 
     def shifts(self, step: FloatArray) -> FloatArray:
         """How far from where they were thought the landmarks are, (n, 3) m, once the pose has made a step."""
-        left = np.where(self.squared[:, None] < _GATE, self.residual - self.by_pose @ step, 0.0)
+        left = np.where(self.squared[:, None] < _GATE * self.scale, self.residual - self.by_pose @ step, 0.0)
         return np.asarray(np.einsum("nij,nj->ni", self.gain, left))
 
 
@@ -196,16 +209,26 @@ def _linearised(
     crossed = doubt @ np.swapaxes(turned, 1, 2)
     inverse = np.linalg.inv(turned @ crossed + sigma_px**2 * np.eye(3))
     squared = np.einsum("ni,nij,nj->n", residual, inverse, residual)
-    weight = np.where(ahead, (_STUDENT + 3.0) / (_STUDENT + squared), 0.0)
+    numbers = np.where(blind, 2.0, 3.0)
+    near = ahead & (np.abs(residual).max(axis=1) < _RANSAC_PX)
+    scale = _scale(squared[near] / numbers[near])
+    weight = np.where(ahead, (_STUDENT + 3.0) / (_STUDENT + squared / scale), 0.0)
     by_pose = np.concatenate([-seen @ _crosses(points), seen], axis=2)
     whitened = np.swapaxes(by_pose, 1, 2) @ (weight[:, None, None] * inverse)
     information = (whitened @ by_pose).sum(axis=0)
     if np.linalg.matrix_rank(information) < 6:
         return None
     gradient = np.einsum("nij,nj->i", whitened, residual)
-    squared, numbers = np.where(ahead, squared, np.inf), np.where(blind, 2.0, 3.0)
+    squared = np.where(ahead, squared, np.inf)
     gain = crossed @ inverse * ahead[:, None, None]
-    return _Problem(information, gradient, residual, squared, numbers, by_pose, gain)
+    return _Problem(information, gradient, residual, squared, numbers, by_pose, gain, scale)
+
+
+def _scale(squared: FloatArray) -> float:
+    """How many times as large as expected variances are, by their residuals' squares a number (k,)."""
+    if len(squared) < _LEAST_POINTS:
+        return 1.0
+    return min(max(1.0, float(np.median(squared)) / _USUAL), _MOST_SCALE)
 
 
 def _crosses(points: FloatArray) -> FloatArray:
@@ -234,7 +257,7 @@ def carried(
     points = pose.points(landmarks.points)
     foretold = calibration.sights(points)
     blind = ~np.isfinite(sights[:, 2])
-    noise = np.tile(sigma_px**2 * np.eye(3), (len(points), 1, 1))
+    noise = np.tile(pose.scale * sigma_px**2 * np.eye(3), (len(points), 1, 1))
     noise[blind, 2, 2] = _BLIND_PX2
     residual = np.where(np.isfinite(sights), sights - foretold, 0.0)
     for _ in range(2):  # the second time linearised where the average is

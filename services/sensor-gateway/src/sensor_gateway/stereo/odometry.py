@@ -6,6 +6,7 @@ and covariances of successive key frames are nearly independent. A pair without 
 moment; if sight comes back too late for that, the next motion starts at the new pair, and the chain is broken.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +14,11 @@ import numpy.typing as npt
 
 from bootprint.messages import CameraMotion, Vector3, upper_triangle
 from sensor_gateway.stereo.calibration import FloatArray, StereoCalibration
-from sensor_gateway.stereo.health import WORDS, Condition, Look, Verdict, condition_of, look_at
+from sensor_gateway.stereo.health import WORDS, Condition, Look, Verdict, condition_of, look_at, sharpness_of
 from sensor_gateway.stereo.images import Image, Pixels, as_grey, evened
 from sensor_gateway.stereo.motion import Landmarks, Pose, carried, solve
+from sensor_gateway.stereo.recognition import recognised
+from sensor_gateway.stereo.right_eye import RightEye
 from sensor_gateway.stereo.settings import OdometrySettings
 from sensor_gateway.stereo.tracking import find_corners, follow, match_rows
 
@@ -26,6 +29,10 @@ _PLAIN_OF_ALL, _PLAIN_OF_SEEN = 0.15, 0.7
 _NEAREST_M = 0.1
 _NEAR_CORNERS = 60
 _DEEP = 5  # levels of the pyramid: a corner is found again 100 px off
+_MOST_STEPS = 6  # ahead of the last pair with a motion: beyond, nobody goes on as they went
+_MOST_M_S2, _SLACK_M = 20.0, 0.05  # of a head or a car, over the time from pair to pair
+_FEW_MATCHED = 0.25  # of the corners: fewer, and the right eye may look elsewhere
+_SIGHTLESS: tuple[Condition, ...] = ("dark", "smoke")
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +41,9 @@ class _Pair:
 
     time_ns: int
     left: Image
-    right: Image
+    right: Image  # straightened
+    right_as_seen: Image
+    sharpness: float
 
 
 @dataclass(slots=True)
@@ -64,6 +73,8 @@ class StereoOdometry:
         self._pose = Pose.none()  # of the newest pair with a motion, from the key frame
         self._pose_ns = 0
         self._step = Pose.none()  # from the pair before to that one
+        self._step_ns = 0  # how long that took
+        self._right_eye = RightEye(calibration)
         self._sequence = 0
         self._told_start_ns: int | None = None  # of the newest motion
 
@@ -75,13 +86,16 @@ class StereoOdometry:
                 raise ValueError("left and right differ in size")
         except ValueError as error:
             return Verdict(time_ns, "bad_image", str(error))
-        pair = _Pair(time_ns, evened(left_grey), evened(right_grey))
+        pair = self._pair(time_ns, evened(left_grey), evened(right_grey))
         look = look_at(left_grey)
         if self._key is None or not self._key.pair.time_ns < time_ns:
             return self._begin(pair, look)
         if look.is_dark:
             return self._blind(pair, "dark")
         return self._follow(pair, look, self._key)
+
+    def _pair(self, time_ns: int, left: Image, right: Image) -> _Pair:
+        return _Pair(time_ns, left, self._right_eye.straightened(right), right, sharpness_of(left))
 
     @property
     def key_time_ns(self) -> int | None:
@@ -104,10 +118,10 @@ class StereoOdometry:
         ):
             depth = float(np.median(key.landmarks.points[:, 2])) if len(key.landmarks) else None
             return self._blind(pair, condition_of(look, depth, share if _agreeing(pose) else None), look)
-        self._step = pose.after(self._pose.inverse())
+        self._step, self._step_ns = pose.after(self._pose.inverse()), pair.time_ns - self._pose_ns
         self._pose, self._pose_ns = pose, pair.time_ns
         motion = self._told(key, pose, share, pair.time_ns)
-        if self._needs_key(key, pose, seen, pair.time_ns):
+        if self._needs_key(key, pose, seen, pair):
             self._move_key(pair, key, pose, seen)
         return motion
 
@@ -117,10 +131,12 @@ class StereoOdometry:
         Near first, for patterns repeat themselves. What was lost is looked for again where the pose says it is.
         """
         best: tuple[_Seen, Pose | None] = (_Seen(np.zeros(0, dtype=np.int64), np.zeros((0, 3))), None)
-        onward = self._step.after(self._pose)
-        for guess, levels in ((onward, 2), (onward, _DEEP), (self._pose, _DEEP), (Pose.none(), _DEEP)):
+        onward = self._onward(pair.time_ns)
+        for guess, levels in self._guesses(pair, key, onward):
             seen = self._look(pair, key, guess, levels)
             pose = self._solve(key, seen, guess)
+            if pose is not None and not self._is_bearable(pose, onward, pair.time_ns):
+                continue
             if _agreeing(pose) > _agreeing(best[1]):
                 best = (seen, pose)
             if pose is not None and self._is_plain(pose, key):
@@ -131,6 +147,29 @@ class StereoOdometry:
             if _agreeing(pose) > _agreeing(best[1]):
                 best = (seen, pose)
         return best
+
+    def _guesses(self, pair: _Pair, key: _KeyFrame, onward: Pose) -> Iterator[tuple[Pose, int]]:
+        """Where the camera may be, and how many levels of the pyramid lead there."""
+        yield from ((onward, 2), (onward, _DEEP), (self._pose, _DEEP), (Pose.none(), _DEEP))
+        index, pixels = recognised(key.pair.left, key.landmarks.pixels, pair.left)
+        blind = np.full((len(index), 1), np.nan)
+        found = self._solve(key, _Seen(index, np.hstack([pixels, blind])), onward)
+        if found is not None:
+            yield found, 2
+
+    def _onward(self, time_ns: int) -> Pose:
+        """Where steps like the last one lead."""
+        since = (time_ns - self._pose_ns) / self._step_ns if self._step_ns > 0 else 1.0
+        onward = self._pose
+        for _ in range(min(_MOST_STEPS, max(1, round(since)))):
+            onward = self._step.after(onward)
+        return onward
+
+    def _is_bearable(self, pose: Pose, onward: Pose, time_ns: int) -> bool:
+        """Whether somebody can have been pushed so: a wall of alike tiles fits a tile further on as well."""
+        seconds = (time_ns - self._pose_ns) / _NS_PER_S
+        most_m = _SLACK_M + _MOST_M_S2 * seconds**2
+        return self._step_ns <= 0 or float(np.linalg.norm(pose.place - onward.place)) <= most_m
 
     def _look(self, pair: _Pair, key: _KeyFrame, guess: Pose, levels: int) -> _Seen:
         """Follow the key frame's landmarks into the left image now, and from there into the right one."""
@@ -205,16 +244,21 @@ class StereoOdometry:
 
     # --- key frames --------------------------------------------------------------------------------------------
 
-    def _needs_key(self, key: _KeyFrame, pose: Pose, seen: _Seen, time_ns: int) -> bool:
+    def _needs_key(self, key: _KeyFrame, pose: Pose, seen: _Seen, pair: _Pair) -> bool:
         settings = self._settings
+        if self._is_blurred(pair, key) and _agreeing(pose) >= 2 * settings.least_landmarks:
+            return False  # corners of a blurred view lie anywhere
         agreeing = seen.sights[pose.agree, :2]
         shift = np.linalg.norm(agreeing - key.landmarks.pixels[seen.index[pose.agree]], axis=1)
         return (
             len(agreeing) < settings.key_share * key.born
-            or bool(np.median(shift) > settings.key_parallax_px)
+            or bool(np.median(shift) > settings.key_parallax_rad * self._calibration.focal_x_px)
             or float(pose.rotation.magnitude()) > settings.key_turn_rad
-            or time_ns - key.pair.time_ns > settings.longest_key_s * _NS_PER_S
+            or pair.time_ns - key.pair.time_ns > settings.longest_key_s * _NS_PER_S
         )
+
+    def _is_blurred(self, pair: _Pair, key: _KeyFrame) -> bool:
+        return pair.sharpness < self._settings.blurred * key.pair.sharpness
 
     def _move_key(self, pair: _Pair, key: _KeyFrame, pose: Pose, seen: _Seen) -> None:
         """The newest pair becomes the key frame; landmarks that agree come along."""
@@ -237,22 +281,35 @@ class StereoOdometry:
         settings = self._settings
         wanted = settings.most_landmarks - len(kept)
         corners = find_corners(pair.left, kept.pixels, wanted, (settings.columns, settings.rows))
-        landmarks = kept.with_more(self._placed(pair, corners))
+        pair, placed = self._placed(pair, corners)
+        landmarks = kept.with_more(placed)
         self._key = _KeyFrame(pair, landmarks, len(landmarks))
         self._pose, self._pose_ns = Pose.none(), pair.time_ns
 
-    def _placed(self, pair: _Pair, corners: FloatArray) -> Landmarks:
-        """Corners (n, 2) that the right eye sees too, as landmarks."""
-        most_px = int(self._settings.largest_disparity * pair.left.shape[1])
-        sights, sure = match_rows(pair.left, pair.right, corners, most_px)
+    def _placed(self, pair: _Pair, corners: FloatArray) -> tuple[_Pair, Landmarks]:
+        """Corners (n, 2) that the right eye sees too, as landmarks; rows tell how that eye looks."""
+        sights, rows, sure = self._matched(pair, corners)
+        if sure.sum() < _FEW_MATCHED * len(corners):
+            self._right_eye.forget()
+            sights, rows, sure = self._matched(pair, corners)
+        right = np.column_stack([sights[sure, 2], rows[sure]])
+        if self._right_eye.learn(corners[sure], right):
+            pair = self._pair(pair.time_ns, pair.left, pair.right_as_seen)
+            sights, rows, sure = self._matched(pair, corners)
         sure[sure] &= self._calibration.disparity(sights[sure]) >= self._settings.least_disparity_px
         points = self._calibration.points(sights[sure])
         doubt = np.tile(self._settings.sight_sigma_px**2 * np.eye(3), (len(points), 1, 1))
-        return Landmarks(corners[sure], points, doubt)
+        return pair, Landmarks(corners[sure], points, doubt)
+
+    def _matched(
+        self, pair: _Pair, corners: FloatArray
+    ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+        most_px = int(self._settings.largest_disparity * pair.left.shape[1])
+        return match_rows(pair.left, pair.right, corners, most_px, self._right_eye.rows_aside)
 
     def _begin(self, pair: _Pair, look: Look) -> Verdict:
         """A key frame out of nothing."""
-        self._step = Pose.none()
+        self._step, self._step_ns = Pose.none(), 0
         nothing = Landmarks(np.zeros((0, 2)), np.zeros((0, 3)), np.zeros((0, 3, 3)))
         self._set_key(pair, nothing)
         assert self._key is not None
@@ -265,13 +322,19 @@ class StereoOdometry:
     def _nearness_m(self, pair: _Pair) -> float | None:
         """Median depth of what both eyes see, however near; None if that is nothing."""
         corners = find_corners(pair.left, np.zeros((0, 2)), _NEAR_CORNERS, (4, 3))
-        sights, sure = match_rows(pair.left, pair.right, corners, pair.left.shape[1])
+        sights, _, sure = match_rows(pair.left, pair.right, corners, pair.left.shape[1])
         sure[sure] &= self._calibration.disparity(sights[sure]) > 0.0
         return float(np.median(self._calibration.points(sights[sure])[:, 2])) if sure.any() else None
 
     def _blind(self, pair: _Pair, condition: Condition, look: Look | None = None) -> Verdict:
-        """No motion: hold on to the key frame for a moment, then begin anew where something is to be seen."""
-        if pair.time_ns - self._pose_ns > self._settings.longest_gap_s * _NS_PER_S:
+        """No motion: hold on to the key frame for a moment, then begin anew where something is to be seen.
+
+        While nothing is to be seen the key frame may yet be recognised.
+        """
+        assert self._key is not None
+        sightless = condition in _SIGHTLESS or self._is_blurred(pair, self._key)
+        patience_s = self._settings.remembered_s if sightless else self._settings.longest_gap_s
+        if pair.time_ns - self._pose_ns > patience_s * _NS_PER_S:
             self._key = None
             if look is not None:
                 self._begin(pair, look)

@@ -25,11 +25,15 @@ class OdometrySettings(Config, frozen=True):
     largest_disparity: Share = 0.4  # of the image's width: what is nearer is a lens cap or a shoulder
     least_share: Share = 0.4  # of the landmarks that should be in view: fewer agree where a crowd moves
     key_share: Share = 0.6  # of its landmarks still seen: below, a new key frame
-    key_parallax_px: Positive = 25.0  # median shift since the key frame that makes a new one
+    key_parallax_rad: Positive = 0.125  # median shift since the key frame that makes a new one, as an angle
     key_turn_rad: Positive = 0.2
     longest_key_s: Positive = 2.0
-    longest_gap_s: Positive = 0.6  # without a motion: the key frame is given up, and the chain is broken
+    longest_gap_s: Positive = 0.6  # without a motion: a key frame that is not recognised is given up
+    remembered_s: Positive = 3.0  # ... while there is nothing to see: darkness, smoke, blur
+    blurred: Share = (
+        0.5  # of the key frame's sharpness: such a view makes no key frame while the old one serves
+    )
     told_landmarks: Annotated[int, msgspec.Meta(ge=1, le=40)] = 30  # a key frame, at most, for maps of rooms
     told_landmark_sigma_m: Positive = 0.3  # of their depth, at most
-    scale_sigma: NonNegative = 0.002  # of the translation: calibration and matching err alike in all frames
+    scale_sigma: NonNegative = 0.005  # of the translation: calibration and matching err alike in all frames
     turn_sigma: NonNegative = 0.001  # of the rotation

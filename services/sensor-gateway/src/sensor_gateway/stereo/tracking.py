@@ -17,7 +17,6 @@ _LEVELS = 4
 _RETURN_PX = 0.7
 _QUALITY, _APART_PX, _BORDER_PX = 0.003, 7, 8
 _PATCH = 7  # half side of the patch that is searched along a row
-_ROWS_ASIDE = 1  # rectification is good to a row
 _LEAST_LIKENESS, _UNIQUE = 0.75, 0.95
 
 
@@ -90,37 +89,41 @@ def _flow(
     return np.asarray(there, dtype=np.float32), np.asarray(found[:, 0] == 1)
 
 
-def match_rows(left: Image, right: Image, corners: FloatArray, most_px: int) -> tuple[FloatArray, BoolArray]:
-    """Sights (n, 3) of corners (n, 2) of the left image, and which of them are sure.
+def match_rows(
+    left: Image, right: Image, corners: FloatArray, most_px: int, rows_aside: int = 1
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Sights (n, 3) of corners (n, 2) of the left image, their rows (n,) in the right one, and which are sure.
 
-    Each corner's patch is searched along its row by normalised correlation, whatever its disparity is up to
-    ``most_px``; the peak must stand out, and following refines it to a fraction of a pixel.
+    Each corner's patch is searched along its row, ``rows_aside`` up and down, by normalised correlation, whatever
+    its disparity is up to ``most_px``; the peak must stand out, and following refines it to a fraction of a pixel.
     """
-    start = np.array([_searched(left, right, corner, most_px) for corner in corners]).reshape(-1, 2)
+    start = np.array([_searched(left, right, corner, most_px, rows_aside) for corner in corners])
+    start = start.reshape(-1, 2)
     sure = np.isfinite(start[:, 0])
     there, followed = follow(left, right, corners[sure], start[sure], levels=0)
-    sights = np.column_stack([corners, np.full(len(corners), np.nan)])
+    found = np.full((len(corners), 2), np.nan)
     index = np.flatnonzero(sure)
-    level = np.abs(there[:, 1] - corners[sure][:, 1]) < 1.0 + _ROWS_ASIDE
-    near = np.abs(there[:, 0] - start[sure][:, 0]) < 2.0
+    near = (np.abs(there - start[sure]) < 2.0).all(axis=1)
+    level = np.abs(there[:, 1] - corners[sure][:, 1]) < 1.0 + rows_aside
     good = followed & level & near
-    sights[index[good], 2] = there[good, 0]
-    return sights, np.isfinite(sights[:, 2])
+    found[index[good]] = there[good]
+    return np.column_stack([corners, found[:, 0]]), found[:, 1], np.isfinite(found[:, 0])
 
 
-def _searched(left: Image, right: Image, corner: FloatArray, most_px: int) -> tuple[float, float]:
+def _searched(
+    left: Image, right: Image, corner: FloatArray, most_px: int, rows_aside: int
+) -> tuple[float, float]:
     """Where a corner's patch lies in the right image to a pixel; NaN where nothing stands out."""
     nowhere = (float("nan"), float("nan"))
     x, y = round(corner[0]), round(corner[1])
     height, width = left.shape
-    top = y - _PATCH - _ROWS_ASIDE
-    if x < _PATCH or x + _PATCH >= width or top < 0 or y + _PATCH + _ROWS_ASIDE >= height:
+    top, bottom = max(0, y - _PATCH - rows_aside), min(height, y + _PATCH + rows_aside + 1)
+    if x < _PATCH or x + _PATCH >= width or y < _PATCH or y + _PATCH >= height:
         return nowhere
     patch = left[y - _PATCH : y + _PATCH + 1, x - _PATCH : x + _PATCH + 1]
     first = max(0, x - _PATCH - most_px)
     last = min(width, x + _PATCH + 3)
-    strip = right[top : y + _PATCH + _ROWS_ASIDE + 1, first:last]
-    likeness = cv2.matchTemplate(strip, patch, cv2.TM_CCOEFF_NORMED)
+    likeness = cv2.matchTemplate(right[top:bottom, first:last], patch, cv2.TM_CCOEFF_NORMED)
     row, column = divmod(int(likeness.argmax()), likeness.shape[1])
     best = float(likeness[row, column])
     others = likeness.copy()

@@ -60,7 +60,7 @@ class Feet:
     ) -> Movement:
         """The class of a step; ``yaw_rad`` amid it, counter-clockwise, not wrapped."""
         movement = self._classifier.update(stride, climb, tilt_rad, facing_known)
-        self._rotation.update(movement.direction, yaw_rad)
+        self._rotation.update(movement.direction, yaw_rad, stride.end_ns * 1e-9)
         self._told.append((stride.start_ns, stride.end_ns, movement))
         return movement
 
