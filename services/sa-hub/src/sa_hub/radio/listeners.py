@@ -68,6 +68,11 @@ class Listeners:
         """Whether every receiver does that was heard within 5 min of the time passed, and there is one."""
         return self.tell and self._heard_ns.keys() <= self._listeners.keys()
 
+    @property
+    def all_hear(self) -> bool:
+        """Whether every receiver tells what it hears, and that it misses next to nothing: no chance is left."""
+        return self.all_tell and self.loss < LOSSLESS
+
     def widen(self, slots: int) -> None:
         """Make room for so many soldiers."""
         self._slots = slots

@@ -159,7 +159,7 @@ class RadioNet:
         self._bucket.refused = False
         self._bucket.fill(now_ns)
         self._sealer.full_headers.ample = self._bucket.free_bits > _AMPLE * self._bucket.depth_bits
-        self._sealer.full_headers.known = self.scheduler.listeners.all_tell
+        self._sealer.full_headers.known = self.scheduler.listeners.all_hear
         try:
             if self._speak_notices(frames, now_ns):
                 self._speak_reports(frames, candidates, now_ns)

@@ -1,8 +1,8 @@
 """Telling in full again: for whoever can resolve nothing of a soldier, and does not say so.
 
 The first times soon, since a first frame may be missed, then after ever longer pauses. One such frame takes what
-several updates need, so it takes no more than a share of the budget, and where all say what they hear, so that
-little is left to chance, the longest pause is the first.
+several updates need, so it takes no more than a share of the budget, and where all say that they hear nearly all,
+so that little is left to chance, the longest pause is the first.
 """
 
 from collections.abc import Iterable
@@ -59,7 +59,7 @@ class Refreshing:
         """(n,) of telling in full again; of an old report nothing, it will be told when it is newer."""
         least_s = _SELDOM * room.full_s(len(who.reports))
         longest_s = max(_longest_pause_s(listeners, cheap=cheap), least_s)
-        first_s = longest_s if listeners.all_tell else max(_FIRST_S[cheap], least_s)
+        first_s = longest_s if listeners.all_hear else max(_FIRST_S[cheap], least_s)
         overdue = [
             self._overdue(number, now_ns, first_s, longest_s) * (now_ns - report.time_ns < _OLD_NS)
             for number, report in zip(who.numbers, who.reports, strict=True)
