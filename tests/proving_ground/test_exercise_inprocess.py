@@ -141,7 +141,7 @@ def test_loss_takes_its_share_of_deliveries_and_makes_pictures_worse(squad: Exer
     counts = result.played.nets["squad"]
     assert 0.3 < counts.lost / (counts.lost + counts.delivered) < 0.7
     assert plain.played.nets["squad"].lost == 0
-    first, second = (each.figures["pictures"][0]["age_p95_s"] for each in (plain, result))
+    first, second = (each.figures["pictures"][0]["picture_error_p95_m"] for each in (plain, result))
     assert second > first
     assert sum(row["lost"] for row in result.figures["links"]) > 0
 

@@ -90,24 +90,24 @@ def test_the_gap_counts_its_last_minute_of_the_way_in_it() -> None:
 
 
 def test_a_squad_in_lockstep_hears_of_each_other_over_the_radio() -> None:
-    """One knows the start, the other is 8 m off and unsure; they walk side by side, 10 m apart, and range."""
+    """One knows the start, the other is 8 m off and unsure; they walk side by side, 40 m apart, and range."""
     walk = SimulatedWalk(straight(0.0), 25.0)
     times = np.arange(0.0, 27.0, 0.2)
     way = np.array([[*walk.body(LEFT, RIGHT, time_s=t), 0.0] for t in times])
-    ways = [way + np.array([0.0, by, 0.0]) for by in (0.0, 10.0)]
+    ways = [way + np.array([0.0, by, 0.0]) for by in (0.0, 40.0)]
     exercise = squad_of(
         tuple(soldier(f"a{n + 1}", n + 1, Truth(times, way)) for n, way in enumerate(ways)), "two"
     )
     starts = (
         StartConfig(east_m=0.0, north_m=0.0, sigma_m=0.2, azimuth_deg=90.0),
-        StartConfig(east_m=0.0, north_m=18.0, sigma_m=8.0, azimuth_deg=90.0),
+        StartConfig(east_m=0.0, north_m=48.0, sigma_m=8.0, azimuth_deg=90.0),
     )
     seats = [seat(exercise, walk, number, start) for number, start in enumerate(starts)]
     positions = SquadPlay(seats).run()
     assert set(Counter(positions)) == {"a1", "a2"}
-    assert positions["a2"][-1].north_m == pytest.approx(10.0, abs=2.0)
+    assert positions["a2"][-1].north_m == pytest.approx(40.0, abs=2.0)
     deaf = [replace(one, hears=lambda each: each.address.subject != "range") for one in seats]
-    assert SquadPlay(deaf).run()["a2"][-1].north_m == pytest.approx(18.0, abs=0.5)
+    assert SquadPlay(deaf).run()["a2"][-1].north_m == pytest.approx(48.0, abs=0.5)
 
 
 def seat(exercise: Exercise, walk: SimulatedWalk, number: int, start: StartConfig) -> Seat:
@@ -117,7 +117,7 @@ def seat(exercise: Exercise, walk: SimulatedWalk, number: int, start: StartConfi
         envelope(
             "range",
             "uwb",
-            Range(time_ns=WALK_NS + s * NS, sequence=s, peer=f"a{2 - number}", distance_m=10.0),
+            Range(time_ns=WALK_NS + s * NS, sequence=s, peer=f"a{2 - number}", distance_m=40.0),
         )
         for s in range(1, 25)
     ]

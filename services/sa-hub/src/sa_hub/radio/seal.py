@@ -41,8 +41,8 @@ class FullHeaders:
     """When epoch and counter travel in full: at once, then after 1 s, 2 s, 4 s, … and at last every 2 min.
 
     ``ample``: bits are plenty, so that every frame may carry them and nobody has to wait. ``known``: everybody who
-    was heard says that it hears nearly all of ours, so it knows the counter; then they come every 2 min at once, until somebody
-    asks: whoever does was not among them, and the row begins anew.
+    was heard says that it hears nearly all of ours, so it knows the counter; then they come every 2 min at once,
+    until somebody asks: whoever does was not among them, and the row begins anew.
     """
 
     def __init__(self) -> None:
