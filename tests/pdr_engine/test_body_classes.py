@@ -145,10 +145,12 @@ def test_corrections_are_those_of_the_source() -> None:
 
 
 def walk_on(
-    rotation: SideStepRotation, ways: list[tuple[Direction, float, int]], drift_deg_s: float = 0.0
+    rotation: SideStepRotation,
+    ways: list[tuple[Direction, float, int]],
+    drift_deg_s: float = 0.0,
+    at_s: float = 0.0,
 ) -> None:
     """Stretches of (direction, where the body faces in degrees, steps), half a second a step; the gyro drifts."""
-    at_s = 0.0
     for direction, facing_deg, steps in ways:
         for _ in range(steps):
             rotation.update(direction, math.radians(facing_deg + drift_deg_s * at_s), at_s)
@@ -156,13 +158,20 @@ def walk_on(
 
 
 def test_the_rotation_is_learned_where_side_steps_begin_and_end() -> None:
+    """Of 6 ± 10° a scalar Kalman filter makes, of changes by 13° seen with 2.02, 2.02 and 2.31° (its noise):
+
+    12.729 (gain 0.961), 12.877 (0.547) and 12.924° (0.377).
+    """
     rotation = SideStepRotation()
     assert rotation.rotation_rad == USUAL_ROTATION_RAD
     # Forward, left (the body turns left, the heading grows), forward again; a change is seen a step late.
     walk_on(rotation, [("forward", 0.0, 12), ("forward", 13.0, 1), ("left", 13.0, 30), ("left", 0.0, 1)])
-    assert math.degrees(rotation.rotation_rad) == pytest.approx(13.0, abs=0.8)
-    walk_on(rotation, [("forward", 0.0, 12), ("right", -13.0, 12)])
-    assert (rotation.observations, math.degrees(rotation.rotation_rad)) == (3, pytest.approx(13.0, abs=0.4))
+    assert math.degrees(rotation.rotation_rad) == pytest.approx(12.729, abs=1e-3)
+    walk_on(rotation, [("forward", 0.0, 12), ("right", -13.0, 12)], at_s=22.0)
+    assert (rotation.observations, math.degrees(rotation.rotation_rad)) == (
+        3,
+        pytest.approx(12.924, abs=1e-3),
+    )
 
 
 def test_a_gyro_s_drift_is_no_rotation() -> None:

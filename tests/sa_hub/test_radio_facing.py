@@ -11,8 +11,8 @@ from sa_hub.radio.references import resolved
 from sa_hub.radio.room import Room
 from sa_hub.radio.scheduler import Policy, Scheduler
 from support.hub_squad import ORIGIN, START_NS, S
+from support.radio_reports import METRE_DEG
 
-METRE_DEG = 1.0 / 111_133.0
 GRID, CODEC = Grid(ORIGIN), Codec(ORIGIN)
 FULL = Room(4000.0, 4000.0, 1200.0, 16000.0, 80.0)
 HALF_EMPTY = Room(1500.0, 4000.0, 10.0, 1600.0, 80.0)

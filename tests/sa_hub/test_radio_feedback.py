@@ -15,8 +15,8 @@ from sa_hub.radio.scheduler import Policy
 from sa_hub.radio.seal import NetKeys, Opener, Sealer
 from sa_hub.settings import LinkProfile
 from support.hub_squad import GROUP_KEY, ORIGIN, START_NS, S
+from support.radio_reports import METRE_DEG
 
-METRE_DEG = 1.0 / 111_133.0
 SENDER, POST = 1, 9
 NUMBERS = range(1, 20)
 RATE_BITS_PER_S = 60

@@ -5,30 +5,17 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from sa_hub.radio.content import Report, Reports, Update
+from sa_hub.radio.content import Reports, Update
 from sa_hub.radio.frame import Codec
 from sa_hub.radio.history import DEPTH
 from sa_hub.radio.offers import Terms, Wares, best_offer, may_pay
 from sa_hub.radio.room import Room
 from sa_hub.radio.scheduler import Policy, Scheduler
 from support.hub_squad import ORIGIN, START_NS, S
+from support.radio_reports import at
 
 CODEC = Codec(ORIGIN)
-METRE_DEG = 1.0 / 111_133.0
 SOLDIERS = 30
-
-
-def at(number: int, seconds: float, north_m: float, floor: int = 1, north_m_s: float = 0.0) -> Report:
-    """A report from some metres north of the origin."""
-    return Report(
-        number=number,
-        time_ns=START_NS + round(seconds * S),
-        latitude_deg=ORIGIN.latitude_deg + north_m * METRE_DEG,
-        longitude_deg=ORIGIN.longitude_deg,
-        accuracy_m=1.0,
-        floor=floor,
-        north_m_s=north_m_s,
-    )
 
 
 @pytest.mark.parametrize("payload_bytes", [20, 30, 40, 50])
@@ -38,8 +25,10 @@ def test_an_update_fits_its_frame_and_leaves_out_who_matters_least(
 ) -> None:
     """All have walked on, the higher their number the farther; the new floors of some take bits, too."""
     plan, numbers = Scheduler(Policy(), own=1, grid=CODEC.grid), range(1, SOLDIERS + 1)
-    plan.sent(0, Reports(tuple(at(each, 0.0, 50.0 * each) for each in numbers)), START_NS)
-    squad = [at(each, 1.0, 5.0 + 50.1 * each, 1 + (each in on_stairs), 1.3) for each in numbers]
+    plan.sent(0, Reports(tuple(at(each, 0.0, 50.0 * each, floor=1) for each in numbers)), START_NS)
+    squad = [
+        at(each, 1.0, 5.0 + 50.1 * each, floor=1 + (each in on_stairs), north_m_s=1.3) for each in numbers
+    ]
     content = plan.plan(squad, Room(40_000.0, 40_000.0, 1200.0, 8.0 * payload_bytes, 80.0), START_NS + S)
     assert isinstance(content, Update)
     assert payload_bytes - 6 < len(CODEC.encode(1, content, 3, 999)) <= payload_bytes

@@ -24,23 +24,11 @@ from sa_hub.radio.scheduler import Policy, Scheduler
 from sa_hub.radio.seal import NetKeys, Opener, Sealer
 from sa_hub.settings import LinkProfile
 from support.hub_squad import GROUP_KEY, ORIGIN, START_NS, S
+from support.radio_reports import METRE_DEG, at
 
-METRE_DEG = 1.0 / 111_133.0
 GRID, CODEC = Grid(ORIGIN), Codec(ORIGIN)
 WIDE = Room(2000.0, 4000.0, 1200.0, 1600.0, 80.0)
 NARROW = replace(WIDE, rate_bits_per_s=5.0)
-
-
-def at(number: int, seconds: float, north_m: float = 0.0, **options: object) -> Report:
-    """A report from some metres north of the origin."""
-    return Report(
-        number=number,
-        time_ns=START_NS + round(seconds * S),
-        latitude_deg=ORIGIN.latitude_deg + north_m * METRE_DEG,
-        longitude_deg=ORIGIN.longitude_deg,
-        accuracy_m=1.0,
-        **options,  # type: ignore[arg-type]
-    )
 
 
 def scheduler(**policy: float) -> Scheduler:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sa_hub.radio.content import AlertNotice, Report, Reports
+from sa_hub.radio.content import AlertNotice, Reports
 from sa_hub.radio.counters import Block, MemoryCounters
 from sa_hub.radio.frame import Codec
 from sa_hub.radio.net import RadioNet
@@ -15,21 +15,9 @@ from sa_hub.radio.scheduler import Policy
 from sa_hub.radio.seal import NetKeys, Opener, Sealer
 from sa_hub.settings import LinkProfile
 from support.hub_squad import GROUP_KEY, ORIGIN, START_NS, S
+from support.radio_reports import at
 
-METRE_DEG = 1.0 / 111_405.0
 NUMBERS = range(1, 200)
-
-
-def at(number: int, seconds: float, north_m: float = 0.0, **options: object) -> Report:
-    """A report from some metres north of the origin."""
-    return Report(
-        number=number,
-        time_ns=START_NS + round(seconds * S),
-        latitude_deg=ORIGIN.latitude_deg + north_m * METRE_DEG,
-        longitude_deg=ORIGIN.longitude_deg,
-        accuracy_m=1.0,
-        **options,  # type: ignore[arg-type]
-    )
 
 
 def alert(seconds: float = 0.0, text: str = "") -> AlertNotice:

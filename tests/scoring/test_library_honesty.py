@@ -90,7 +90,10 @@ def test_the_gap_counts_its_last_minute_of_the_way_in_it() -> None:
 
 
 def test_a_squad_in_lockstep_hears_of_each_other_over_the_radio() -> None:
-    """One knows the start, the other is 8 m off and unsure; they walk side by side, 40 m apart, and range."""
+    """One knows the start, the other is 8 m off and unsure; they walk side by side and range.
+
+    40 m apart: within 8 m of doubt a range bends so much at 10 m that it would hardly be a line.
+    """
     walk = SimulatedWalk(straight(0.0), 25.0)
     times = np.arange(0.0, 27.0, 0.2)
     way = np.array([[*walk.body(LEFT, RIGHT, time_s=t), 0.0] for t in times])

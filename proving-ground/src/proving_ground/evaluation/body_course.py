@@ -150,11 +150,14 @@ def _lengths(person: Person, course: str, seeds: Sequence[int], quality: str) ->
     for seed in seeds:
         _, strides = _walked(person, course, seed, quality)
         count.update(_settled(strides))
-    return {direction: len(seeds) * SIDE_M / count[direction] for direction in _DIRECTION.values()}
+    # A direction that was never told counts as one long step: the closing error shows it.
+    return {direction: len(seeds) * SIDE_M / max(count[direction], 1) for direction in _DIRECTION.values()}
 
 
 def _settled(strides: Sequence[Stride]) -> list[Direction]:
     """The direction of each step by all that is known `LAG` steps later."""
+    if not strides:
+        return []
     classifier, settled = MovementClassifier(), list[Direction]()
     for number, stride in enumerate(strides):
         found = classifier.update(stride).direction
