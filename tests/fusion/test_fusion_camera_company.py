@@ -27,6 +27,7 @@ from support.foot_walks import (
     RIGHT,
     T0,
     WHO,
+    Path,
     SimulatedWalk,
     envelope,
     in_time_order,
@@ -121,12 +122,21 @@ def test_both_in_the_dark_the_feet_go_on_from_where_the_camera_took_them() -> No
     assert normalised_squared(back, walk) < 13.8
 
 
-def test_feet_that_tell_late_of_their_silence_are_not_counted_beside_the_camera() -> None:
-    walk, core = SimulatedWalk(straight(0.0), 60.0), FusionCore(DUAL, WHO, ORIGIN)
+@pytest.mark.parametrize("left_first", [False, True])
+@pytest.mark.parametrize(
+    ("path", "late_s"), [(straight(0.0), (40.0, 43.0)), (rectangle(9.0, 6.0), (30.0, 42.0))]
+)
+def test_feet_that_tell_late_of_their_silence_are_not_counted_beside_the_camera(
+    path: Path, late_s: tuple[float, float], *, left_first: bool
+) -> None:
+    """At the end of their silence they tell all of it at once; round corners they turn as they did then."""
+    walk, core = SimulatedWalk(path, 60.0), FusionCore(DUAL, WHO, ORIGIN)
+    feet = [*walk.messages(LEFT), *walk.messages(RIGHT)]
+    if not left_first:
+        feet.sort(key=lambda one: one.message.time_ns)
+    from_ns, until_ns = (T0 + round(at_s * NS) for at_s in late_s)
     heard = [
-        (one.message.time_ns + 3 * NS * (40 * NS < one.message.time_ns - T0 < 43 * NS), one)
-        for foot in (LEFT, RIGHT)
-        for one in walk.messages(foot)
+        (until_ns if from_ns < one.message.time_ns < until_ns else one.message.time_ns, one) for one in feet
     ]
     heard += [(one.message.time_ns, one) for one in WalkingCamera(ASKEW).messages(walk)]
     out = [
@@ -140,6 +150,7 @@ def test_feet_that_tell_late_of_their_silence_are_not_counted_beside_the_camera(
     assert max(jumps_m(said)) < 1.0
     assert said[-1].mode == "boots"
     assert float(np.hypot(*error(said[-1], walk))) < 1.0
+    assert normalised_squared(said[-1], walk) < 13.8
 
 
 def test_the_saved_state_is_of_the_feet() -> None:

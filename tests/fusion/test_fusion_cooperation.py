@@ -259,4 +259,6 @@ def feet_apart_m(ranged_m: float | None) -> float:
             list(core.handle(envelope("range", "feet", ranged)))
     list(core.close())
     feet = core.estimator.boots.feet
-    return float(np.linalg.norm(feet["left_foot"].at(T0 + 17 * NS) - feet["right_foot"].at(T0 + 17 * NS)))
+    return float(
+        np.linalg.norm(feet["left_foot"].trail.at(T0 + 17 * NS) - feet["right_foot"].trail.at(T0 + 17 * NS))
+    )

@@ -148,6 +148,22 @@ def test_moving_the_frame_keeps_distances_and_adds_a_common_error() -> None:
     assert state_filter.covariance[LEFT.start, RIGHT.start] == pytest.approx(4.0)
 
 
+def test_a_turn_towards_who_was_sighted_takes_their_own_error_aside_back() -> None:
+    """A foot whose heading is known to 0.2 rad goes 3 m; then it is told that it went due east, give or take 0.01.
+
+    Its heading and its place aside erred by the same angle, so both are as good as what it was told.
+    """
+    covariance = np.zeros((LAYOUT.size, LAYOUT.size))
+    covariance[LEFT.yaw, LEFT.yaw] = 0.2**2
+    state_filter = StateFilter(LAYOUT, (np.zeros(LAYOUT.size), covariance))
+    state_filter.propagate(LEFT, step((3.0, 0.0, 0.0)), np.zeros((4, 4)))
+    here, told = (3.0, 0.0, 0.0), np.diag([0.0, 0.0, 0.0, 0.01**2])
+    state_filter.transform(RigidTransform((0.0, 0.0, 0.0), (7.0, 8.0, 0.0), 0.0, told, sighted=here), LEFT)
+    np.testing.assert_allclose(state_filter.state[LEFT.all], [10.0, 8.0, 0.0, 0.0], atol=1e-12)
+    variances = np.diag(state_filter.covariance)[LEFT.all]
+    np.testing.assert_allclose(variances, [0.0, (3.0 * 0.01) ** 2, 0.0, 0.01**2], atol=1e-12)
+
+
 @pytest.mark.parametrize("relative", [True, False])
 def test_feet_that_hold_each_other_do_not_learn_where_north_is(relative: bool) -> None:
     """Two feet whose heading is known to 20 degrees pass each other three hundred times.

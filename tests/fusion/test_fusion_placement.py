@@ -116,6 +116,26 @@ def test_a_walk_that_bends_is_judged_by_its_beginning() -> None:
     assert math.sqrt(placement.final.covariance[3, 3]) == pytest.approx(math.hypot(math.radians(5), 0.075))
 
 
+@pytest.mark.parametrize(
+    ("begins", "way", "sighted"),
+    [
+        ((0.0, 0.0), [(0.0, 1.0, 0.0), (0.0, 3.0, 0.0)], (0.0, 3.0, 0.0)),
+        ((0.0, 0.0), [(0.0, 2.0, 0.0), (-1.0, 2.0, 0.0), (-1.0, 0.4, 0.0)], None),  # an early chord counted
+        ((9.0, 0.0), [(9.0, 1.0, 0.0), (9.0, 3.0, 0.0)], None),  # what had erred before nobody knows
+    ],
+)
+def test_who_is_sighted(
+    begins: tuple[float, float], way: list[tuple[float, float, float]], sighted: tuple[float, ...] | None
+) -> None:
+    placement = Placement(ALIGN, GNSS)
+    placement.point_to(known(begins, (100.0, 50.0)), 0.0, math.radians(5))
+    assert placement.hint is not None
+    for point in way:
+        placement.hint.go(point, ALIGN)
+    assert placement.final is not None
+    assert placement.final.sighted == sighted
+
+
 def test_two_known_points_give_the_heading() -> None:
     placement = Placement(ALIGN, GNSS)
     placement.observe(known((0.0, 0.0), (100.0, 50.0), 0.0))

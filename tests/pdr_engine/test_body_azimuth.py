@@ -20,7 +20,7 @@ from pdr_engine.body.azimuth.compass import (
 )
 from pdr_engine.body.azimuth.denoise import approximation
 from pdr_engine.body.azimuth.heading import Combined, CompassAlone, GyroAlone, wrapped
-from pdr_engine.body.azimuth.sources import source_of
+from pdr_engine.body.azimuth.sources import Headings, source_of
 from pdr_engine.body.settings import BodySettings, CompassCalibration, HeadingSettings
 
 SETTINGS = HeadingSettings()
@@ -130,6 +130,32 @@ def test_combined_is_not_led_by_one_wild_reading() -> None:
         combined.step(0.0, 0.5, good(1.0))
     moved = wrapped(combined.step(0.0, 0.5, good(1.0 + 2.0, 0.1)).azimuth_rad - 1.0)
     assert 0.0 < moved < 0.05
+
+
+def bent(azimuth: float) -> Reading:
+    """As a compass reads in a mall: 0.14 rad off, alike over a dozen steps or, for a track's sake, many more."""
+    uneven = SETTINGS.disturbance_floor**2
+    lasting, alike = (steps * uneven for steps in (SETTINGS.correlation_steps, SETTINGS.alike_steps))
+    return Reading(azimuth % math.tau, 0.15, lasting_variance=lasting, alike_variance=alike)
+
+
+def test_north_is_found_soon_and_the_track_keeps_its_shape() -> None:
+    """A first reading 0.3 rad off, then right ones: after 60 the track has still turned by less than half of it."""
+    headings = Headings("combined", SETTINGS)
+    headings.step(0.0, 0.5, bent(1.3))
+    tracks, norths = zip(*(headings.step(0.0, 0.5, bent(1.0)) for _ in range(60)), strict=True)
+    assert wrapped(norths[-1].azimuth_rad - 1.0) == pytest.approx(0.0, abs=0.05)
+    assert wrapped(tracks[-1].azimuth_rad - 1.0) > 0.15
+    assert norths[0].sigma_rad > tracks[0].sigma_rad  # hardly believed at first
+    assert norths[-1].sigma_rad < tracks[-1].sigma_rad
+
+
+@pytest.mark.parametrize("name", ["bridge", "gyro", "compass", "cascade"])
+def test_other_sources_have_one_azimuth(name: str) -> None:
+    headings = Headings(name, SETTINGS)
+    for azimuth in (1.3, 1.0, 1.0):
+        track, north = headings.step(0.1, 0.5, bent(azimuth))
+        assert track == north
 
 
 @pytest.mark.parametrize("name", ["combined", "bridge", "bridge-direct", "bridge-weighted"])

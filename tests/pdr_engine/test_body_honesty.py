@@ -36,8 +36,9 @@ def test_honest_fixes_are_not_suspected(seed: int) -> None:
     assert judged(1.0, seed=seed) == 5.0
 
 
-def test_steps_off_in_direction_and_length_are_no_reason_to_suspect() -> None:
-    assert judged(0.2, turned_rad=2.5, scale=0.94) == 5.0
+@pytest.mark.parametrize("scale", [0.94, 0.8, 1.25])
+def test_steps_off_in_direction_and_length_are_no_reason_to_suspect(scale: float) -> None:
+    assert judged(0.2, stated_m=2.0, turned_rad=2.5, scale=scale) == 2.0
 
 
 def test_fixes_that_err_four_times_as_much_are_believed_less() -> None:

@@ -100,6 +100,24 @@ def test_fixes_refine_the_weights_of_a_gait_and_leave_another_alone() -> None:
     assert again.factor == pytest.approx(scale.factor)
 
 
+def test_what_walking_shows_says_nothing_of_runs() -> None:
+    """Walked steps are 10 % longer than told, runs as long as told; fixes see both, by turns."""
+    scale = PersonalScale()
+    east = 0.0
+    for second in range(1200):
+        runs = second // 60 % 2 == 1
+        scale.fix(second * SECOND_NS, east, 0.0, 2.0)
+        if second == 60:
+            scale.meet((), "running")
+            assert scale.factor == 1.0  # nobody has run yet
+        scale.meet((), "running" if runs else "walking")
+        scale.walk(1.4 * scale.factor, 0.5)
+        east += 1.4 * (1.0 if runs else 1.1)
+    assert scale.factor == pytest.approx(1.0, abs=0.02)
+    scale.meet(())
+    assert scale.factor == pytest.approx(1.1, abs=0.02)
+
+
 def test_no_feature_makes_a_refined_factor_run_away() -> None:
     scale = PersonalScale(refinement=(0.9, -0.9))
     scale.meet([1e6, 0.0])

@@ -236,9 +236,13 @@ def test_measuring_tells_metres_degrees_and_mils(looking: Tab) -> None:
 
 def test_who_is_followed_stays_in_the_middle(looking: Tab) -> None:
     page = looking.page
+    looking.says(
+        "void (squad.began = new Map(squad.state.seen().map(each => [each.track.soldier, each.track])))"
+    )
     mover = looking.wait(
-        "squad.state.seen().find(each => Math.hypot(each.track.east_velocity_m_s,"
-        " each.track.north_velocity_m_s) > 0.4)?.track.soldier"
+        """squad.state.seen().map(each => [each.track, squad.began.get(each.track.soldier)]).find(
+        ([now, then]) => then && Math.hypot(now.latitude_deg - then.latitude_deg,
+        now.longitude_deg - then.longitude_deg) > 1e-5)?.[0].soldier"""
     )
     page.click(f'.row[data-soldier="{mover}"]')
     page.keyboard.press("g")

@@ -75,9 +75,9 @@ def doctor(computer: Path) -> tuple[int, dict[str, str]]:
 
 
 def child(up: subprocess.Popen[bytes], name: str) -> psutil.Process | None:
-    for process in psutil.Process(up.pid).children():
+    for process in psutil.Process(up.pid).children(recursive=True):
         with suppress(psutil.Error):  # one that has just ended
-            if any(part.endswith(f"/{name}") for part in process.cmdline()[:3]):
+            if process.name() == name:
                 return process
     return None
 
@@ -88,8 +88,9 @@ def test_everything_runs_is_kept_running_and_leaves_nothing(computer: Path) -> N
         wait_until(
             lambda: doctor(computer)[1].items() >= dict.fromkeys(SERVICES, "ok").items(), 90.0, "all run"
         )
-        children = psutil.Process(up.pid).children()
-        assert len(children) == 5
+        children = psutil.Process(up.pid).children(recursive=True)
+        assert {process.name() for process in children} >= {*SERVICES, "bootprint"}
+        assert len(children) == 6  # and who forks them
         before = child(up, "fusion")
         assert before is not None
         with closing(open_bus(router)) as bus:
@@ -104,7 +105,7 @@ def test_everything_runs_is_kept_running_and_leaves_nothing(computer: Path) -> N
             )
             heard.clear()
             wait_until(lambda: any(health.sequence == 1 for health in heard), 30.0, "its health")
-        left = psutil.Process(up.pid).children()
+        left = psutil.Process(up.pid).children(recursive=True)
     wait_until(lambda: not any(process.is_running() for process in left), what="nothing is left")
     log = (computer.parent / "up.log").read_text()
     assert 'event="process ended" process=fusion how="was killed by signal 9"' in log

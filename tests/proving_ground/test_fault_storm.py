@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -21,6 +22,7 @@ from proving_ground.exercises.heard import Heard
 from proving_ground.exercises.inprocess_play import line_job
 from proving_ground.exercises.line import Line, play_line
 from proving_ground.exercises.memory_growth import memory_growth
+from proving_ground.exercises.observer import in_umpires_time
 from proving_ground.exercises.process_faults import Outage
 from proving_ground.exercises.recovery import fault_rows, storm_summary
 from proving_ground.exercises.squad import COMMAND_POST, squad_of
@@ -98,6 +100,28 @@ def test_a_picture_is_right_again_when_everybody_is_fresh_again() -> None:
     row = rows_of(heard_reports([(20, 33)]), Fault(20.0, "radio_gone", "a1", {"for_s": 10.0}))
     assert row["right_after_s"] == pytest.approx(3.0)
     assert row["wrong_s"] == pytest.approx(33.0 - 24.0)
+
+
+@pytest.mark.parametrize("wrong_s", [0, -3600, 3600])
+@pytest.mark.parametrize("republished_s", [0, 90])
+def test_reports_of_a_hub_whose_clock_is_wrong_are_as_old_as_it_shows_them(
+    wrong_s: int, republished_s: int
+) -> None:
+    """Of second 7, received at 9, looked at now or when it was told again as lost."""
+    (track,) = heard_reports([]).newest.values()
+    told = msgspec.structs.replace(
+        track, time_ns=(7 + wrong_s) * NS_PER_S, received_ns=(9 + wrong_s) * NS_PER_S
+    )
+    ours = in_umpires_time(told, (9 + republished_s) * NS_PER_S, {-3600.0, 3600.0})
+    assert (ours.time_ns, ours.received_ns) == (7 * NS_PER_S, 9 * NS_PER_S)
+
+
+def test_an_exercise_tells_whose_clock_it_sets_wrong() -> None:
+    faults = [
+        Fault(at_s, "clock_jump", "a1", {"jump_s": jump_s}) for at_s, jump_s in ((5, 3600.0), (9, -60.0))
+    ]
+    assert replace(SQUAD, faults=tuple(faults)).clock_jumps_s == {"a1": {3600.0, -60.0}}
+    assert SQUAD.clock_jumps_s == {}
 
 
 def test_a_picture_that_is_fresh_and_wrong_is_not_right_and_honest_if_it_owns_up_to_it() -> None:

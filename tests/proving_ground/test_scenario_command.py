@@ -38,6 +38,18 @@ def test_list_has_a_line_for_every_scenario() -> None:
         assert re.search(rf"^{name} +\d+:\d\d +\d+ ", output, re.MULTILINE), name
 
 
+def test_honesty_has_a_row_for_the_scenario_and_one_for_all(tmp_path: Path) -> None:
+    file = written(tmp_path, HEAD + UNITS + team('{ do = "walk", to = [2, 9] }', at="[2, 0]", soldiers=3))
+    rows = tmp_path / "rows.json"
+    output = exercise("honesty", file, "--seed", 2, "--soldiers", 2, "--json", rows)
+    one, total = json.loads(rows.read_text(encoding="utf-8"))
+    assert (one["scenario"], total["scenario"]) == ("test", "all")
+    assert one["soldiers"] == total["soldiers"] == 2
+    assert 0.0 < one["error_p95_m"] < 3.0
+    assert total["least_inside_95_pct"] <= total["inside_95_pct"] <= 100.0
+    assert re.search(r"all +│ +2 │", output)
+
+
 def test_list_as_json() -> None:
     rows = json.loads(exercise("list", "--json", "-"))
     by_name = {row["scenario"]: row for row in rows}

@@ -15,7 +15,6 @@ from sa_hub.radio.hearing import KEEPS_NS, Hearing
 from sa_hub.radio.listeners import Listeners
 from sa_hub.radio.net import RadioNet
 from sa_hub.radio.pacing import CHEAPEST, Pacing, usual_level
-from sa_hub.radio.persistence import Persistence
 from sa_hub.radio.picture import Spoken
 from sa_hub.radio.relevance import LEADER, NEAR_OTHERS, NEAR_SEEN, Relevance
 from sa_hub.radio.replay import Heard
@@ -65,6 +64,21 @@ def test_a_prediction_that_holds_is_not_told_and_one_that_fails_is() -> None:
     assert tell(plan, [at(1, 9.0, north_m=30.0, north_m_s=1.0)], room=NARROW, counter=1) == [1]
 
 
+def test_who_is_far_from_worth_his_bits_is_looked_at_half_as_often() -> None:
+    """At this price 7 m off would be told: at 1 m there is time, at 6 m there is none to lose."""
+    plan, room = scheduler(), replace(WIDE, rate_bits_per_s=5.0)
+    assert tell(plan, [at(1, 0.0)], room) == [1]
+
+    def pause_s(time_s: float, north_m: float) -> float:
+        now_ns = START_NS + round(time_s * S)
+        plan.pass_time(room, 1, now_ns)
+        assert plan.plan([at(1, time_s, north_m=north_m)], room, now_ns) is None
+        return next(tenths / 10 for tenths in range(10) if plan.is_due(now_ns + tenths * S // 10))
+
+    assert pause_s(2.0, north_m=1.0) == 0.4
+    assert pause_s(4.0, north_m=6.0) == 0.2
+
+
 @pytest.mark.parametrize("rate_bits_per_s", [75.0, 300.0, 1200.0, 9600.0])
 def test_at_ordinary_rates_who_is_where_he_was_told_is_only_told_in_full_again_ever_more_seldom(
     rate_bits_per_s: float,
@@ -84,7 +98,7 @@ def test_at_ordinary_rates_who_is_where_he_was_told_is_only_told_in_full_again_e
     pauses_s = [after - before for before, after in itertools.pairwise(told_s)]
     assert all(after > 1.5 * before for before, after in itertools.pairwise(pauses_s))
     assert 2 <= len(pauses_s) <= 4  # after 1, 2, 4 and 8 s, or after 3 times what it takes of the budget
-    assert tell(plan, [at(1, 30.0, north_m=30.0)], room, counter=1) == [1]
+    assert tell(plan, [at(1, 30.2, north_m=30.0)], room, counter=1) == [1]
 
 
 def test_what_the_net_told_itself_is_never_repeated_to_it() -> None:
@@ -252,25 +266,6 @@ def test_blue_on_blue_goes_first() -> None:
     content = plan.plan(moved, replace(WIDE, payload_bits=47.0), START_NS + 4 * S)
     assert isinstance(content, Update)
     assert [entry.number for entry in content.entries] == [3]
-
-
-def walked(legs_s: float, seconds: int = 60) -> Persistence:
-    """One who goes to and fro at 1 m/s in legs of this length."""
-    persistence = Persistence()
-    persistence.widen(1)
-    north_m = 0.0
-    for second in range(seconds):
-        speed = 1.0 if int(second / legs_s) % 2 == 0 else -1.0
-        sample = [second, ORIGIN.latitude_deg + north_m * METRE_DEG, ORIGIN.longitude_deg, 0.0, speed]
-        persistence.see(np.array([0]), np.array([sample]), 8.0)
-        north_m += speed
-    return persistence
-
-
-@pytest.mark.parametrize(("legs_s", "lasts"), [(1000.0, True), (4.0, False)])
-def test_a_velocity_that_does_not_last_is_not_told(legs_s: float, lasts: bool) -> None:
-    share = walked(legs_s).shares(np.array([0]))[0]
-    assert share == pytest.approx(1.0 if lasts else 0.0, abs=1e-2)
 
 
 # -- who has heard what -------------------------------------------------------------------------------------------

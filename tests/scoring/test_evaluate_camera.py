@@ -14,7 +14,7 @@ from proving_ground.evaluation.camera import walk_camera
 from proving_ground.evaluation.evaluate import evaluate_task, methods_of, plan
 from proving_ground.sensors import Mounting, write_camera_folder
 from sensor_gateway.recordings import load_runs
-from sensor_gateway.recordings.camera_folder import pairs
+from sensor_gateway.recordings.camera_folder import pairs, projections
 from support.camera_rooms import Swaying, room
 from support.moving import Straight
 from support.stereo_walks import SMALL
@@ -72,6 +72,24 @@ def test_jpeg_and_colour_are_read(damaged: Path) -> None:
             path.unlink()
     walked = walk_camera(load_runs([damaged])[0])
     assert walked.verdicts == {"starting": 1}
+
+
+def test_numbers_in_names_count_as_numbers(damaged: Path) -> None:
+    """Names without leading zeros: 9.png comes before 10.png."""
+    for side in ("image_l", "image_r"):
+        for number, path in enumerate(sorted((damaged / side).iterdir())):
+            path.rename(path.with_name(f"{number}.png"))
+    (run,) = load_runs([damaged])
+    assert run.stereo is not None
+    assert [path.stem for path in run.stereo.right] == [str(number) for number in range(30)]
+
+
+@pytest.mark.parametrize("colon", [":", " :"])
+def test_a_calibrations_names_may_stand_close_to_the_numbers(damaged: Path, colon: str) -> None:
+    path = damaged / "calib.txt"
+    before = projections(path)
+    path.write_text(path.read_text().replace(": ", colon), encoding="utf-8")
+    np.testing.assert_array_equal(projections(path), before)
 
 
 def test_pairs_without_sight_are_bridged_as_one_went(damaged: Path) -> None:

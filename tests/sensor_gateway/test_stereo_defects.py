@@ -10,6 +10,7 @@ from proving_ground.sensors.camera_defects import Bursts, Defects, defective_pai
 from sensor_gateway.stereo.motion import Landmarks, Pose, solve
 from sensor_gateway.stereo.recognition import recognised
 from sensor_gateway.stereo.right_eye import RightEye
+from sensor_gateway.stereo.turned_in import turned_in
 from support.camera_rooms import Swaying, room
 from support.moving import Straight
 from support.stereo_walks import SMALL, FloatArray, Sequence, calibration, render, told
@@ -54,6 +55,14 @@ def test_defects_cost_little(defects: Defects) -> None:
     assert way_error_share(filmed(defects)) < 0.03
 
 
+def test_a_pair_that_is_missing_breaks_no_chain() -> None:
+    """At 4 m/s the next one is 0.4 m further on than it should be, and its time does not say so."""
+    whole = render(room(), Straight((-4.0, 0.0, 1.5), (4.0, 0.0, 0.0)), 1.2)
+    kept = np.delete(np.arange(len(whole.pairs)), 6)
+    thinned = Sequence(tuple(whole.pairs[at] for at in kept), whole.place_m[kept], whole.attitude[kept])
+    assert way_error_share(thinned) < 0.02
+
+
 def turned_rows(state: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Sights of an eye that is turned by ω, its focal length longer by ε: by projection, not linearised."""
     points = np.column_stack([rng.uniform(-0.7, 0.7, 150), rng.uniform(-0.5, 0.5, 150), np.ones(150)])
@@ -93,6 +102,16 @@ def test_an_eye_as_calibrated_is_left_alone() -> None:
     assert eye.rows_aside == 1
 
 
+def test_what_is_left_alone_is_not_learned_again_and_again() -> None:
+    """Rows a twentieth of a pixel off, told forty times: still a twentieth, and no reason to turn the image."""
+    rng = np.random.default_rng(6)
+    eye, image = RightEye(CALIBRATION), np.zeros((SMALL.height_px, SMALL.width_px), dtype=np.uint8)
+    eye.straightened(image)
+    for _ in range(40):
+        assert not eye.learn(*turned_rows(np.array([0.0003, 0.0, 0.0, 0.0]), rng))
+    assert eye.straightened(image) is image
+
+
 def test_matches_that_are_wrong_do_not_turn_the_eye() -> None:
     rng = np.random.default_rng(8)
     eye, image = RightEye(CALIBRATION), np.zeros((SMALL.height_px, SMALL.width_px), dtype=np.uint8)
@@ -101,6 +120,62 @@ def test_matches_that_are_wrong_do_not_turn_the_eye() -> None:
     right[:40, 1] += 5.0
     eye.learn(left, right)
     assert eye.straightened(image) is image
+
+
+def corridor_points(rng: np.random.Generator, count: int = 240) -> FloatArray:
+    """Points on two walls, a floor and a ceiling, all seen before and after half a metre ahead."""
+    points = np.column_stack(
+        [rng.uniform(-1.2, 1.2, count), rng.uniform(-1.2, 1.4, count), rng.uniform(2.2, 12.0, count)]
+    )
+    points[: count // 2, 0] = np.sign(points[: count // 2, 0]) * 1.2
+    points[count // 2 :, 1] = np.where(points[count // 2 :, 1] > 0.0, 1.4, -1.2)
+    return points
+
+
+def seen_by_turned_eye(points: FloatArray, turn_rad: float, rng: np.random.Generator) -> FloatArray:
+    """Sights (n, 3) of a pair whose right eye is turned in: by projection, not linearised."""
+    sights = CALIBRATION.sights(points)
+    right = (
+        Rotation.from_rotvec([0.0, turn_rad, 0.0]).inv().apply(points - [CALIBRATION.baseline_m, 0.0, 0.0])
+    )
+    sights[:, 2] = CALIBRATION.right_centre_x_px + CALIBRATION.focal_x_px * right[:, 0] / right[:, 2]
+    return sights + rng.normal(0.0, 0.15, sights.shape)
+
+
+@pytest.mark.parametrize("turn_px", [0.0, 0.3, -0.4])
+def test_a_motion_tells_how_far_the_right_eye_is_turned_in(turn_px: float) -> None:
+    """One step says most of it (the rest when that has been taken out); their spread is as claimed or less."""
+    rng = np.random.default_rng(9)
+    turn, shift = Rotation.from_rotvec([0.01, 0.02, 0.005]), np.array([0.02, -0.01, -0.5])
+    found = []
+    for _ in range(25):
+        points = corridor_points(rng)
+        known, sights = (
+            seen_by_turned_eye(places, turn_px / CALIBRATION.focal_x_px, rng)
+            for places in (points, turn.apply(points) + shift)
+        )
+        doubt = np.tile(0.15**2 * np.eye(3), (len(points), 1, 1))
+        landmarks = Landmarks(known[:, :2], CALIBRATION.points(known), doubt)
+        pose = solve(CALIBRATION, landmarks, sights, 0.15, Pose.none())
+        assert pose is not None
+        told = turned_in(CALIBRATION, landmarks, sights, pose, 0.15)
+        assert told is not None
+        found.append((told[0] * CALIBRATION.focal_x_px, np.sqrt(told[1]) * CALIBRATION.focal_x_px))
+    values, claimed = np.array(found).T
+    assert values.mean() == pytest.approx(turn_px, abs=0.05, rel=0.25)
+    assert values.std() < 1.3 * claimed.mean()
+
+
+def test_an_eye_that_is_turned_in_is_turned_back() -> None:
+    """Motions tell what is left of 0.6 px; as much as can be told is taken out of images."""
+    eye, image = RightEye(CALIBRATION), np.zeros((SMALL.height_px, SMALL.width_px), dtype=np.uint8)
+    eye.straightened(image)
+    assert eye.learn_turn(0.6 / CALIBRATION.focal_x_px, 1e-8)
+    middle = (SMALL.height_px // 2, SMALL.width_px // 2)
+    image[middle[0] - 20 : middle[0] + 20, middle[1]] = 255
+    row = eye.straightened(image)[middle[0]].astype(float)
+    # A turn to the right by ω moves what is ahead left by f ω: it is taken back to the right.
+    assert (row @ np.arange(SMALL.width_px)) / row.sum() - middle[1] == pytest.approx(0.6, abs=0.1)
 
 
 def test_sights_three_times_as_bad_as_expected_still_agree() -> None:

@@ -11,8 +11,10 @@ import pytest
 
 from bootprint.bus import Envelope
 from bootprint.messages import Health, Pressure
+from bootprint.service import PROMPT_BEAT_S, Context, Service
 from bootprint.topics import Identity
 from bootprint.zenoh_bus import ZenohBus, open_bus
+from support.echo_service import build
 from support.routers import free_endpoint, running_router
 from support.waiting import wait_until
 
@@ -73,6 +75,23 @@ def test_signals_end_it_cleanly_and_its_last_word_is_stopped(tmp_path: Path, num
         assert code == 0
         assert "Traceback" not in errors
         wait_until(lambda: health[-1].state == "stopped")
+
+
+@pytest.mark.parametrize(("arguments", "beat_s"), [((), PROMPT_BEAT_S), (("--beat", "0.2"), 0.2)])
+def test_it_looks_at_the_bus_as_often_as_it_chooses_or_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], beat_s: float
+) -> None:
+    told: list[float] = []
+
+    def noted(_service: Service, context: Context) -> int:
+        told.append(context.beat_s)
+        return 0
+
+    monkeypatch.setattr("bootprint.service.run", noted)
+    monkeypatch.setattr(sys, "argv", ["echo", "--config", str(write_config(tmp_path)), *arguments])
+    with pytest.raises(SystemExit) as ended:
+        Service("echo", "Repeats pressures.", ("pressure",), build, PROMPT_BEAT_S).main()
+    assert (ended.value.code, told) == (0, [beat_s])
 
 
 def test_closing_its_input_ends_it(tmp_path: Path) -> None:

@@ -100,6 +100,7 @@ def test_events_survive_a_router_that_is_replaced() -> None:
     for n in (2, 3, 4):
         sender.publish(step(n))
     router = EmbeddedRouter(endpoint)
+    wait_until(lambda: sender.is_connected() and receiver.is_connected(), what="both found the new router")
     sender.publish(step(5))
     wait_until(lambda: set(heard) >= {1, 2, 3, 4, 5}, timeout_s=30.0, what="steps sent while no router ran")
     sender.close()

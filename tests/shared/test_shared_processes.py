@@ -55,7 +55,8 @@ def test_an_unknown_command_is_an_error_in_words(tmp_path: Path) -> None:
         ProcessGroup().start(ProcessSpec("x", "no-such-command", (), tmp_path / "x.log"))
 
 
-def test_a_killed_parent_leaves_no_child(tmp_path: Path) -> None:
+@pytest.mark.parametrize("forked", [(), ("bootprint",)], ids=["started", "forked"])
+def test_a_killed_parent_leaves_no_child(tmp_path: Path, forked: tuple[str, ...]) -> None:
     script = textwrap.dedent(
         f"""
         import sys, threading
@@ -63,7 +64,7 @@ def test_a_killed_parent_leaves_no_child(tmp_path: Path) -> None:
         sys.path.insert(0, {str(Path(__file__).parents[1])!r})
         from bootprint.processes import ProcessGroup, ProcessSpec
         from support.routers import free_endpoint
-        group = ProcessGroup()
+        group = ProcessGroup({forked!r})
         log = Path({str(tmp_path / "child.log")!r})
         group.start(ProcessSpec("child", "bootprint", ("router", "--listen", free_endpoint()), log))
         print(group.pids["child"], flush=True)

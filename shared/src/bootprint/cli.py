@@ -61,6 +61,13 @@ def group(app: typer.Typer, name: str, summary: str) -> typer.Typer:
     return made
 
 
+def preload() -> None:
+    """What `bootprint router` needs beyond this module; of all commands it alone is kept running by another."""
+    import bootprint.keys.gatekeeper  # noqa: F401
+
+    typer.main.get_command(build_app(["router"])).make_context("bootprint", ["router"])
+
+
 def main() -> None:
     """The console script: one line and exit 2 on anything a person can mend."""
     try:

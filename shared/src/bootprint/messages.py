@@ -266,11 +266,13 @@ class FootPose(Message, frozen=True):
 class BodyStep(Message, frozen=True):
     """One step seen by a body-worn unit (compass, gyro, barometer).
 
-    ``azimuth_rad`` is where the step led, ``direction`` how the feet went against where the body faces;
-    ``class_pct`` is the probability of motion and direction. ``settled_…`` tells what the step that ended at that
-    time, some steps earlier, was by all that followed. ``floor`` counts from where the walk began. Redundancy
-    percentages say how much of the information is checked by other information; ``external_reliability_m`` what
-    disturbances that nobody noticed may have done to the place since the last absolute fix.
+    ``azimuth_rad`` is where the step led, ``track_azimuth_rad`` the same in the track's own frame: by these, steps
+    add up to a track of the right shape that may be turned as a whole. ``direction`` is how the feet went against
+    where the body faces; ``class_pct`` is the probability of motion and direction. ``settled_…`` tells what the
+    step that ended at that time, some steps earlier, was by all that followed. ``floor`` counts from where the walk
+    began. Redundancy percentages say how much of the information is checked by other information;
+    ``external_reliability_m`` what disturbances that nobody noticed may have done to the place since the last
+    absolute fix.
     """
 
     start_time_ns: TimeNs
@@ -295,6 +297,7 @@ class BodyStep(Message, frozen=True):
     settled_time_ns: TimeNs | None = None
     settled_motion: MotionClass | None = None
     settled_direction: Direction | None = None
+    track_azimuth_rad: float | None = None
 
 
 class Fix(Message, frozen=True):

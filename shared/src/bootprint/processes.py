@@ -2,13 +2,14 @@
 
 Every child runs with ``--stop-on-eof`` and a pipe on its standard input: when the parent dies, however it dies,
 the pipe closes and the child ends. A normal stop closes the pipes, waits, then terminates, then kills.
+Commands that are started again and again can be forked from a server that has imported them (`fork_server`).
 """
 
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +17,15 @@ from types import TracebackType
 from typing import BinaryIO
 
 from bootprint.errors import BootprintError
+from bootprint.fork_server import Forked, ForkServer, ForkServerError
 
 _GRACE_S = 6.0
+Child = subprocess.Popen[bytes] | Forked
+_FORCES: tuple[Callable[[Child], None], ...] = (
+    lambda _: None,  # its input is closed: it ends by itself
+    lambda child: child.terminate(),
+    lambda child: child.kill(),
+)
 
 
 class ProcessError(BootprintError):
@@ -41,32 +49,44 @@ class ProcessSpec:
 class ProcessGroup:
     """Processes of one parent; a context manager that leaves none behind."""
 
-    def __init__(self) -> None:
-        self._running: dict[str, tuple[ProcessSpec, subprocess.Popen[bytes]]] = {}
+    def __init__(self, forked: Sequence[str] = ()) -> None:
+        """``forked``: commands to be forked from a server that has them imported, instead of started afresh."""
+        self._running: dict[str, tuple[ProcessSpec, Child]] = {}
+        self._server = ForkServer(forked)
 
     def start(self, spec: ProcessSpec) -> None:
         """Start one process; ProcessError if its command is not installed."""
+        arguments = [*spec.arguments, "--stop-on-eof"]
         with _opened(spec) as log:
-            process = subprocess.Popen(
-                [_find(spec.command), *spec.arguments, "--stop-on-eof"],
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=log,
-                start_new_session=True,  # Ctrl-C reaches the parent, which then stops its children in order
-            )
+            if self._server.serves(spec.command):
+                process: Child = self._forked(spec.command, arguments, log)
+            else:
+                process = _popen(spec.command, arguments, log)
         self._running[spec.name] = (spec, process)
+
+    def _forked(self, command: str, arguments: Sequence[str], log: BinaryIO | None) -> Forked:
+        try:
+            return self._server.start(command, arguments, log)
+        except ForkServerError as error:
+            raise ProcessError(str(error)) from error
 
     @property
     def pids(self) -> dict[str, int]:
         """Process id by name."""
         return {name: process.pid for name, (_, process) in self._running.items()}
 
+    @property
+    def all_pids(self) -> dict[str, int]:
+        """The same with the ``fork-server``, if there is one: all that this group costs."""
+        server = {} if self._server.pid is None else {"fork-server": self._server.pid}
+        return self.pids | server
+
     def failed(self) -> list[str]:
         """One line for each process that ended with an error: its name, exit code and last words."""
         return [
-            f"{name} {end_of(process.returncode)}{_last_words(spec)}"
+            f"{name} {end_of(code)}{_last_words(spec)}"
             for name, (spec, process) in self._running.items()
-            if process.poll() not in (None, 0)
+            if (code := process.poll())
         ]
 
     def reap(self) -> dict[str, int]:
@@ -114,13 +134,14 @@ class ProcessGroup:
         for process in processes:
             if process.stdin:
                 process.stdin.close()
-        for force in (None, subprocess.Popen.terminate, subprocess.Popen.kill):
-            if force is not None:
-                for process in processes:
-                    if process.poll() is None:
-                        force(process)
+        for force in _FORCES:
+            for process in processes:
+                if process.poll() is None:
+                    force(process)
             if _all_ended(processes, _GRACE_S):
-                return
+                break
+        if names is None:
+            self._server.close()
 
     def __enter__(self) -> "ProcessGroup":
         return self
@@ -131,7 +152,17 @@ class ProcessGroup:
         self.stop()
 
 
-def _all_ended(processes: list[subprocess.Popen[bytes]], within_s: float) -> bool:
+def _popen(command: str, arguments: Sequence[str], log: BinaryIO | None) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [_find(command), *arguments],
+        stdin=subprocess.PIPE,
+        stdout=log,
+        stderr=log,
+        start_new_session=True,  # Ctrl-C reaches the parent, which then stops its children in order
+    )
+
+
+def _all_ended(processes: list[Child], within_s: float) -> bool:
     deadline = time.monotonic() + within_s
     for process in processes:
         try:

@@ -32,6 +32,7 @@ from bootprint.zenoh_bus import Inlet, ZenohBus, open_bus
 
 _INBOX_SIZE = 20_000
 DEFAULT_BEAT_S = 0.05
+PROMPT_BEAT_S = 0.02  # of who stands between sensors and position: each look adds to how late it is
 _LEAST_BEAT_S = 0.002
 _TICK_S = 0.1
 _HEALTH_S = 1.0
@@ -186,18 +187,29 @@ class Context:
 
 @dataclass(frozen=True)
 class Service:
-    """A service: its name (also its command and its liveliness token), its inputs and how its part is built."""
+    """A service: its name (also its command and its liveliness token), its inputs and how its part is built.
+
+    ``beat_s``: between two looks at the bus, unless the command line says otherwise.
+    """
 
     name: str
     summary: str
     subjects: tuple[str, ...]
     build: Callable[[Context], Part]
+    beat_s: float = DEFAULT_BEAT_S
 
     def main(self) -> None:
         """The console script: parse arguments, run, exit (2 with one line on bad input)."""
+        self._app()()
+
+    def preload(self) -> None:
+        """Read an empty command line: what reads them brings libraries of its own only then (`fork_server`)."""
+        typer.main.get_command(self._app()).make_context(self.name, [])
+
+    def _app(self) -> typer.Typer:
         app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
         app.command(help=self.summary)(self._command)
-        app()
+        return app
 
     def _command(
         self,
@@ -215,11 +227,11 @@ class Service:
         wait_for: Annotated[str, typer.Option(help="Services to wait for before replaying: a,b,c.")] = "",
         stop_on_eof: Annotated[bool, typer.Option(help="Stop when standard input closes.")] = False,
         beat: Annotated[
-            float,
+            float | None,
             typer.Option(
                 min=0.002, max=1.0, help="Seconds between two looks at the bus; more saves processor."
             ),
-        ] = DEFAULT_BEAT_S,
+        ] = None,
         log_level: Annotated[str, typer.Option(help="debug, info, warning or error.")] = "info",
         log_json: Annotated[bool, typer.Option(help="Log one JSON object a line.")] = False,
     ) -> None:
@@ -232,7 +244,7 @@ class Service:
             clock_offset_s=clock_offset,
             wait_for=tuple(name for name in wait_for.split(",") if name),
             stop_on_eof=stop_on_eof,
-            beat_s=beat,
+            beat_s=self.beat_s if beat is None else beat,
             log_level=log_level,
             log_json=log_json,
         )

@@ -1,6 +1,6 @@
 """Keeps the processes of one computer running: what ends is started again, what hangs is ended.
 
-Pauses between starts double while a process keeps failing and are short again once it has run for a while. A
+Who has run for a while starts again at once; pauses between starts double while a process keeps failing. A
 process that ends with 0 has done what it was asked; one that was never well and ends with 2 in its first moments
 cannot run as it is configured, and no further start would mend that.
 """
@@ -33,7 +33,7 @@ class Charge:
     started_s: float = 0.0
     heard_s: float | None = None
     due_s: float | None = 0.0
-    pause_s: float = FIRST_PAUSE_S
+    pause_s: float = 0.0
     restarts: int = 0
     finished: bool = False
     refused: bool = False
@@ -57,7 +57,8 @@ class Charge:
         if self.finished:
             self.due_s = None
             return
-        self.pause_s = FIRST_PAUSE_S if ran_s >= STEADY_S else min(2.0 * self.pause_s, LONGEST_PAUSE_S)
+        longer_s = min(max(2.0 * self.pause_s, FIRST_PAUSE_S), LONGEST_PAUSE_S)
+        self.pause_s = 0.0 if ran_s >= STEADY_S else longer_s
         self.due_s = now_s + self.pause_s
 
 

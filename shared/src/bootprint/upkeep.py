@@ -20,7 +20,9 @@ from bootprint.zenoh_bus import ZenohBus, open_bus
 ROUTER: Final = "router"
 SENSING: Final = ("pdr-engine", "fusion", "sensor-gateway")
 HUB: Final = "sa-hub"
-_LOOK_S: Final = 0.1
+_ROUTER_COMMAND: Final = "bootprint"
+LOOK_S: Final = 0.1
+"""Between two looks at the processes: how late an end is noticed."""
 _NOTIFY_S: Final = 1.0
 _ROUTER_WAIT_S: Final = 30
 
@@ -54,7 +56,7 @@ def keep_up(
 ) -> None:
     """Run these services, and a router if none answers, until stopped; ConfigError if one cannot run as it is."""
     specs = _specs(computer, services, logs, log_level)
-    with Stop() as stop, ProcessGroup() as group:
+    with Stop() as stop, ProcessGroup(forked=(*services, _ROUTER_COMMAND)) as group:
         if stop_on_eof:
             stop.watch_input()
         supervisor = Supervisor(group, specs, watched=lambda name: name != ROUTER)
@@ -79,7 +81,7 @@ def _specs(
         *("--router-wait", str(_ROUTER_WAIT_S)),
         *("--log-level", log_level),
     )
-    router = spec(ROUTER, "bootprint", "router", "--config", str(computer.path))
+    router = spec(ROUTER, _ROUTER_COMMAND, "router", "--config", str(computer.path))
     return [
         *([] if answers(computer) else [router]),
         *(spec(name, name, *common) for name in services),
@@ -117,7 +119,7 @@ class _Upkeep:
         try:
             while not self._supervisor.refused:
                 self._look(time.monotonic())
-                if stop.wait(_LOOK_S):
+                if stop.wait(LOOK_S):
                     return
         finally:
             notify("STOPPING=1")

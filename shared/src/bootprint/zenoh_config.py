@@ -14,7 +14,7 @@ def client_settings(router: str, credentials: Credentials | None = None) -> Tabl
         "endpoints": [router],
         "timeout_ms": 0,
         "exit_on_failure": True,
-        "retry": {"period_init_ms": 200, "period_max_ms": 2000, "period_increase_factor": 2},
+        "retry": {"period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 2},
     }
     return {
         "mode": "client",
@@ -46,7 +46,8 @@ def _common(credentials: Credentials | None) -> Table:
     if credentials is not None:
         transport["link"] = {"tls": _tls(credentials)}
     return {
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        # A router that looks for nobody need not wait for answers (`delay`, half a second) before it routes.
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
         "transport": transport,
     }
 

@@ -64,12 +64,14 @@ def register(app: typer.Typer) -> None:
     """Add the commands."""
     from proving_ground.evaluation.body_benchmark import body
     from proving_ground.evaluation.federation_benchmark import federation
+    from proving_ground.evaluation.fusion_benchmark import fusion
     from proving_ground.evaluation.history_benchmark import history
     from proving_ground.performance.command import all_parts
 
     group = typer.Typer(no_args_is_help=True, help="What the parts cost, and whether budgets hold.")
     group.command()(foot)
     group.command()(body)
+    group.command()(fusion)
     group.command()(hub)
     group.command()(budgets)
     group.command()(warnings)

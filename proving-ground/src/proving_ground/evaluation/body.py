@@ -56,7 +56,7 @@ def _heard(trunk: Trunk, message: Message) -> list[BodyStepEstimate]:
 
 
 def body_track(steps: Sequence[BodyStepEstimate], imu: ImuSeries) -> Track:
-    """Where the steps lead from (0, 0), x east if azimuths are from north; still between bouts.
+    """Where the steps lead from (0, 0) in the track's own frame (x east but for a turn); still between bouts.
 
     Heights are those of the steps, NaN if no step has one.
     """
@@ -65,7 +65,7 @@ def body_track(steps: Sequence[BodyStepEstimate], imu: ImuSeries) -> Track:
         if step.start_ns / _NS_PER_S > time_s[-1]:
             time_s.append(step.start_ns / _NS_PER_S)
             place.append(place[-1])
-        way = np.array([math.sin(step.azimuth_rad), math.cos(step.azimuth_rad)])
+        way = np.array([math.sin(step.track_azimuth_rad), math.cos(step.track_azimuth_rad)])
         time_s.append(step.time_ns / _NS_PER_S)
         place.append(place[-1] + step.length_m * way)
     if (end_s := float(imu.time_s[-1])) > time_s[-1]:
@@ -100,7 +100,7 @@ def body_chain(steps: Sequence[BodyStepEstimate]) -> StepChain | None:
     """The steps as the consistency check reads them: straight ahead, then a turn to the next one's azimuth."""
     if not steps:
         return None
-    azimuth = np.array([step.azimuth_rad for step in steps])
+    azimuth = np.array([step.track_azimuth_rad for step in steps])
     turns = -np.append(np.diff(np.unwrap(azimuth)), 0.0)
     length = np.array([step.length_m for step in steps])
     count = len(steps)

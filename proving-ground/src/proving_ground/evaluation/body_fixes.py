@@ -57,7 +57,7 @@ def _pns_track(run: Run, steps: Sequence[BodyStepEstimate]) -> Track:
         return track
     times_s = np.array([steps[0].start_ns, *(step.time_ns for step in steps)]) / _NS_PER_S
     lengths, azimuths = (
-        np.array([getattr(step, name) for step in steps]) for name in ("length_m", "azimuth_rad")
+        np.array([getattr(step, name) for step in steps]) for name in ("length_m", "track_azimuth_rad")
     )
     start = _first_place(fixes, track)
     places, _ = filtered(times_s, start, lengths, azimuths, fixes)

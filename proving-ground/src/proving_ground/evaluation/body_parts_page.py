@@ -52,31 +52,22 @@ of two figures is of what steps were said to be four steps later (`settled_motio
 a ramp up and down, and the stairs up and down at once; weather drifts, doors slam, there is wind at the office. The
 storey's height is told in the hall alone. Errors are of whole climbs, shares are of steps; a floor is right
 from the first step on it; the second of two shares is what was said four steps later. Units at belt, chest, back
-and in the hand. Tried on 24 other walks, no gain: risers counted by the probability of stairs, not by the likeliest
-way, together with stairs told by what the vertical channel rises from a step's end to the next (mean error 0.27 m
-instead of 0.25, stairs told at once 84.7 % instead of 87.2, slopes not taken for stairs 96.4 % instead of
-95.8).""",
+and in the hand.""",
     "Poor satellite fixes (C4)": """phone-gps has no truth, so its track with fixes is held against the one without;
 the walks of msindoor20 get fixes at that phone's times with errors drawn by what is stated. C4's filter is dead
 reckoning with the fixes that state 15 m or less. `python -m proving_ground.evaluation.body_parts_page DATA`""",
 }
 _RECORDED_NOTE = """Fields of dipoles and cables are added to what phones' magnetometers read in malls. Truth is the
 gyro with the offset that fits the unaltered compass best, so "none" is what a perfect detector would leave: the
-building's own iron, 9 to 10° RMS and alike over some ten steps, from which nobody knows north within seconds. The
-default goes by it more slowly than the bridge (a7), for a track that is turned while it is walked loses its shape:
-that is 0.2 m in the table of recorded walks.
-
-No one setting of the default is good at both. With errors alike over 20 steps instead of 240, 2.4°/min of drift to
-begin with instead of 10, and the first reading hardly believed, it has 0.35 and 0.27 of the compass's error past
-dipoles and cables, and 1.73 m instead of 1.70 on the recorded walks. But with so little drift expected, and errors
-alike over 80 steps, two simulated units whose gyros do drift err by 1.35° and 2.28° instead of 1.13° and 1.68°
-where nothing disturbs. Readings that are off by more than one or two sigmas instead of three counted less: no
-change. Whoever needs the azimuth sooner than the shape of a short track selects the bridge (`azimuth = "bridge"`).
+building's own iron, alike over some ten steps, from which nobody knows north within seconds. Whoever believes it
+soon knows north better, and turns a track while it is walked, which costs the track its shape. So the default
+follows two azimuths: `azimuth_rad`, of this table, and `track_azimuth_rad`, by which the table of recorded walks
+adds steps up (see there for what adding them up by `azimuth_rad` would give).
 
 """
 _TOWN_NOTE = """Steps of the whole chain: a calibrated unit at the trunk, a third of the blocks with a stretch of as
 much iron as malls have, the navigator without fixes. Drawn steps err by 4 % in length and 4° in azimuth for good,
-and by 1.5° over some 40 steps as iron leaves it, which alone makes 6 m of 800 without GPS: no filter is told of it.
+and by 1.5° over some 40 steps as iron leaves it: no filter is told of that.
 
 """
 SEEDS = range(1, 6, 2)  # odd ones: choices were made with even ones

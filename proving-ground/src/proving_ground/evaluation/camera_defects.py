@@ -9,7 +9,7 @@ python -m proving_ground.evaluation.camera_defects FOLDER [--seeds N ...] [--onl
 import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,7 @@ from proving_ground.sensors import (
 )
 from proving_ground.sensors.camera_defects import Bursts, Defects
 from sensor_gateway.recordings import load_runs
+from sensor_gateway.recordings.run import Run, Truth
 
 SEEDS = (1, 3)
 HELMET = Mounting(np.array([0.05, 0.0, 0.65]))
@@ -45,12 +46,21 @@ _DRIVE_S, _DRIVE_M_S, _BEND_RAD_S = 5.0, 10.0, 0.04
 
 @dataclass(frozen=True)
 class Case:
-    """One defect, in a corridor on foot or in a street by car."""
+    """One defect, in a corridor on foot or in a street by car.
+
+    ``missing``: the images of the case of that name, from which pairs are missing: one in ten, or every second.
+    """
 
     name: str
     defects: Defects = field(default_factory=Defects)
     tile_m: float | None = None
     street: bool = False
+    missing: tuple[str, int] | None = None
+
+    @property
+    def images(self) -> str:
+        """Name of the case whose images these are."""
+        return self.name if self.missing is None else self.missing[0]
 
 
 CASES = (
@@ -71,7 +81,10 @@ CASES = (
         "a little of everything",
         Defects(0.015, 0.008, Bursts(4.0, 0.4, 0.03), (0.004, -0.0005, 0.003), 1.002, -0.004, 0.4, 0.1, 0.9),
     ),
+    Case("one pair in ten is missing", missing=("none", 10)),
     Case("street", street=True),
+    Case("street, one pair in ten is missing", street=True, missing=("street", 10)),
+    Case("street, every second pair is missing", street=True, missing=("street", 2)),
     Case(
         "street, a little of everything",
         Defects(0.0, 0.006, None, (0.001, -0.0003, 0.001), 1.001, -0.003, 0.3, 0.05, 0.95),
@@ -162,12 +175,12 @@ class Found:
 
 def measure(case: Case, seed: int, folder: Path) -> Found:
     """Render it if it is not there yet, and walk it."""
-    path = folder / f"{case.name.replace(' ', '-').replace(',', '').replace('%', '')}-{seed}"
+    path = folder / f"{case.images.replace(' ', '-').replace(',', '').replace('%', '')}-{seed}"
     if not (path / "poses.txt").exists():
         rng = np.random.default_rng([seed, 8])
         world, camera, motion, mounting, duration_s = _scene(case, seed)
         write_camera_folder(path, world, camera, motion, mounting, duration_s, rng, case.defects)
-    run = load_runs([path], "camera")[0]
+    run = _thinned(load_runs([path], "camera")[0], case)
     walked = walk_camera(run)
     score = score_track(walked.track, run.truth["camera"], "start", walked.chain).score
     blind = sum(count for verdict, count in walked.verdicts.items() if verdict != "starting")
@@ -181,6 +194,19 @@ def measure(case: Case, seed: int, folder: Path) -> Found:
         100.0 * blind / pairs,
         1e3 * walked.seconds / pairs,
     )
+
+
+def _thinned(run: Run, case: Case) -> Run:
+    """Without the pairs that are missing: nothing tells so, the rest comes at the usual rate."""
+    if case.missing is None or run.stereo is None:
+        return run
+    number = np.arange(len(run.stereo.left))
+    kept = np.flatnonzero(number % case.missing[1] != case.missing[1] - 1)
+    time_s = run.stereo.time_s[: len(kept)]
+    left, right = (tuple(eye[at] for at in kept) for eye in (run.stereo.left, run.stereo.right))
+    truth = Truth(time_s, run.truth["camera"].position_m[kept])
+    stereo = replace(run.stereo, time_s=time_s, left=left, right=right)
+    return replace(run, stereo=stereo, truth={"camera": truth})
 
 
 def table(found: Sequence[Found]) -> Iterator[str]:

@@ -57,11 +57,12 @@ Corners are spread over the view, placed by their disparity, and followed from t
 found by P3P and RANSAC and refined over pose and landmarks together, each weighing by its own doubt in pixels. A
 message tells the motion since the key frame, with its covariance: one that starts where the last one started
 replaces it. Images are evened first, so that exposure leaves no trace. In which rows the right eye sees what the
-left one sees tells how it really looks (`stereo.right_eye`): an eye that was knocked is turned back. How far off
-sights are is judged by all of them, so that a rolling shutter or a lens makes motions less sure and no crowd. A
-blurred view makes no key frame, and after moments without sight (up to 3 s) the key frame is recognised by its
-patches if it is still in view, so that the chain holds. Nothing is told, and the gateway's health
-says why, when a verdict speaks against it:
+left one sees tells how it really looks (`stereo.right_eye`), and whether near and far landmarks agree on the way
+tells how far it is turned in (`stereo.turned_in`): an eye that was knocked is turned back. How far off sights are
+is judged by all of them, so that a rolling shutter or a lens makes motions less sure and no crowd. A blurred view
+makes no key frame, and after moments without sight (up to 3 s) the key frame is recognised by its patches if it is
+still in view, so that the chain holds. Nothing is told, and the gateway's health says why, when a verdict speaks
+against it:
 
 | verdict | when |
 |---|---|
@@ -99,9 +100,9 @@ MAVLink modules that do their own odometry enter by the same message (`ODOMETRY`
 ## On rendered walks
 
 {len(SEEDS)} walks of 60 m over two floors, {RISE_M} m apart, images of 320x240 at 10 Hz, the landing of the stair
-lit or dark (seeds {", ".join(map(str, SEEDS))}; nothing was chosen on them). The camera alone is laid over the
-first 5 m of its poses, fused tracks over all of the person's, by yaw and offset; the camera's track begins with its
-true attitude. Median / worst:
+lit or dark (seeds {", ".join(map(str, SEEDS))}; faults were found on them, but no constant was chosen). The camera
+alone is laid over the first 5 m of its poses, fused tracks over all of the person's, by yaw and offset; the
+camera's track begins with its true attitude. Median / worst:
 
 {table(rows)}
 

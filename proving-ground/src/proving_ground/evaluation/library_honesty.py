@@ -1,28 +1,26 @@
-"""Does fusion keep its word over the library? ``python -m proving_ground.evaluation.library_honesty``.
+"""Does fusion keep its word over the library? What `bootprint exercise honesty` tells.
 
 Some soldiers of every scenario, spread over its teams, by several seeds: the share of true places inside the 95 %
 ellipse of the position that was published for the moment, and the mean of the normalised squared error (2 when
 honest). Long scenarios are played for their first part.
 """
 
-import argparse
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from bootprint import logs
 from bootprint.clock import NS_PER_S
 from bootprint.messages import Position
-from pdr_engine.foot import warm_up
 from proving_ground.evaluation.alignment import FloatArray, interpolated
 from proving_ground.evaluation.fusion_lines import Heard, fused, heard_in
 from proving_ground.scenario.build import exercise_of, instrumented
 from proving_ground.scenario.cast import Soldier
-from proving_ground.scenario.loading import library, load_scenario, play
+from proving_ground.scenario.loading import load_scenario, play
 
+Row = dict[str, Any]
 LONGEST_S = 900.0
 SOLDIERS = 2
 SEEDS = (1, 3, 5)
@@ -102,44 +100,41 @@ def measure(scenario: str, seeds: Sequence[int] = SEEDS, soldiers: int = SOLDIER
     ]
 
 
-def table(found: Sequence[Honesty]) -> list[str]:
-    """A row a scenario, and one of all: lines of a Markdown table."""
-    lines = [
-        "| scenario | soldiers | p95 m | inside 95 %: mean | worst soldier | height | normalised² (2) |",
-        "|---|--:|--:|--:|--:|--:|--:|",
-    ]
+def rows(found: Sequence[Honesty]) -> list[Row]:
+    """A row a scenario, and one of all; soldiers count alike, however long they were played."""
     names = sorted({one.scenario for one in found})
-    rows = (_row(name, [one for one in found if one.scenario == name]) for name in names)
-    return [*lines, *rows, _row("all", found)]
+    by_name = (_row(name, [one for one in found if one.scenario == name]) for name in names)
+    return [*by_name, _row("all", found)]
 
 
-def _row(name: str, found: Sequence[Honesty]) -> str:
-    """Soldiers count alike, however long they were played."""
+def _row(name: str, found: Sequence[Honesty]) -> Row:
     shares = [_share(one.inside) for one in found]
     heights = [_share((one.height_squared <= _CHI2_95_ONE)[np.isfinite(one.height_squared)]) for one in found]
-    error_m = np.mean([np.percentile(one.error_m, 95) for one in found])
-    squared = np.mean([np.mean(one.squared) for one in found])
-    cells = (np.mean(shares), np.min(shares), np.nanmean(heights))
-    told = " | ".join(f"{cell:.1f}" for cell in cells)
-    return f"| {name} | {len(found)} | {error_m:.1f} | {told} | {squared:.2f} |"
+    return {
+        "scenario": name,
+        "soldiers": len(found),
+        "error_p95_m": float(np.mean([np.percentile(one.error_m, 95) for one in found])),
+        "inside_95_pct": float(np.mean(shares)),
+        "least_inside_95_pct": float(np.min(shares)),
+        "height_inside_95_pct": float(np.nanmean(heights)),
+        "normalised_squared": float(np.mean([np.mean(one.squared) for one in found])),
+    }
 
 
 def _share(inside: FloatArray | npt.NDArray[np.bool_]) -> float:
     return 100.0 * float(np.mean(inside)) if inside.size else float("nan")
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure the scenarios asked for and print the table."""
-    parser = argparse.ArgumentParser(description="share of truths inside fusion's 95 % ellipse")
-    parser.add_argument("scenarios", nargs="*", default=library())
-    parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS))
-    parser.add_argument("--soldiers", type=int, default=SOLDIERS, help="of each scenario")
-    chosen = parser.parse_args(arguments)
-    logs.configure("error")
-    warm_up()
-    found = [one for name in chosen.scenarios for one in measure(name, chosen.seeds, chosen.soldiers)]
-    sys.stdout.write("\n".join(table(found)) + "\n")
+def table(found: Sequence[Honesty]) -> list[str]:
+    """The rows as lines of a Markdown table."""
+    lines = [
+        "| scenario | soldiers | p95 m | inside 95 %: mean | worst soldier | height | normalised² (2) |",
+        "|---|--:|--:|--:|--:|--:|--:|",
+    ]
+    return [*lines, *(_line(row) for row in rows(found))]
 
 
-if __name__ == "__main__":
-    main()
+def _line(row: Row) -> str:
+    name, soldiers, error_m, *shares, squared = row.values()
+    told = " | ".join(f"{share:.1f}" for share in shares)
+    return f"| {name} | {soldiers} | {error_m:.1f} | {told} | {squared:.2f} |"

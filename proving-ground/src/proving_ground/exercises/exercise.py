@@ -201,6 +201,15 @@ class Exercise:
                 down.append((fault.target, fault.at_s, fault.until_s))
         return sorted(down, key=lambda silence: (silence[1], silence[0]))
 
+    @property
+    def clock_jumps_s(self) -> dict[str, set[float]]:
+        """By how much faults set the clock of a computer's hub wrong, by computer."""
+        jumps = [fault for fault in self.faults if fault.kind == "clock_jump"]
+        return {
+            each.target: {float(one.details["jump_s"]) for one in jumps if one.target == each.target}
+            for each in jumps
+        }
+
     def partings(self, net: Net) -> list[Parting]:
         """When a net is in two parts."""
         return [

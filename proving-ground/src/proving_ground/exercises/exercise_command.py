@@ -2,7 +2,7 @@
 
 import typer
 
-from proving_ground.exercises import run_command, scenario_command
+from proving_ground.exercises import honesty_command, run_command, scenario_command
 
 
 def register(app: typer.Typer) -> None:
@@ -13,4 +13,5 @@ def register(app: typer.Typer) -> None:
     )
     scenario_command.add_to(group)
     run_command.add_to(group)
+    honesty_command.add_to(group)
     app.add_typer(group, name="exercise")

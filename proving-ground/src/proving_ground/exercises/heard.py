@@ -3,7 +3,7 @@
 import math
 from array import array
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +19,7 @@ FloatArray = npt.NDArray[np.float64]
 WATCHED = ("foot_step", "position", "track", "link", "health")
 _COLUMNS = 8
 _MEMORY_EVERY_NS = 10 * NS_PER_S
+STARTING_NS = 10 * NS_PER_S
 _UNKNOWN = Held(math.nan, math.nan)
 
 
@@ -78,8 +79,9 @@ class ReportLog:
 class Heard:
     """What one computer's bus has told so far. ``newest`` are the newest tracks, ``reports`` those of others.
 
-    ``sent`` holds (time ns, bytes on the air so far) of every link; ``latency_s`` is host time from the event time
-    of the soldier's own position to its publication as a track; ``memory_mb`` (time ns, health's number, MB).
+    ``sent`` holds (time ns, bytes on the air so far) of every link; ``latencies`` the event time (ns) of each of
+    the soldier's own positions and the host s from then to its publication as a track; ``memory_mb`` (time ns,
+    health's number, MB).
     """
 
     positions: list[Position] = field(default_factory=list)
@@ -89,7 +91,7 @@ class Heard:
     links: dict[str, LinkReport] = field(default_factory=dict)
     sent: dict[str, list[tuple[int, int]]] = field(default_factory=lambda: defaultdict(list))
     health: dict[str, Health] = field(default_factory=dict)
-    latency_s: list[float] = field(default_factory=list)
+    latencies: list[tuple[int, float]] = field(default_factory=list)
     memory_mb: dict[str, list[tuple[int, int, float]]] = field(default_factory=lambda: defaultdict(list))
 
     def take(self, envelope: Envelope, arrived_ns: int, frame: LocalFrame) -> bool:
@@ -129,7 +131,19 @@ class Heard:
         return {name for name, health in self.health.items() if health.state != "stopped"}
 
 
-def latency_p99_ms(heard: Sequence[Heard]) -> float | None:
-    """99th percentile of host time from a position's event time to the soldier's own track, over all soldiers."""
-    latencies = [latency for computer in heard for latency in computer.latency_s]
-    return float(1000.0 * np.percentile(latencies, 99)) if latencies else None
+def latencies_ms(heard: Sequence[Heard], start_ns: int) -> dict[str, float | None]:
+    """99th percentiles of host time from a position's event time to the soldier's own track, over all soldiers.
+
+    The first seconds stand by themselves: in them services find each other and take in what waited for them.
+    """
+    settled_ns = start_ns + STARTING_NS
+    told = [latency for computer in heard for latency in computer.latencies]
+    return {
+        "latency_p99_ms": _p99_ms(latency_s for at_ns, latency_s in told if at_ns >= settled_ns),
+        "latency_start_p99_ms": _p99_ms(latency_s for at_ns, latency_s in told if at_ns < settled_ns),
+    }
+
+
+def _p99_ms(latencies_s: Iterable[float]) -> float | None:
+    values = list(latencies_s)
+    return float(1000.0 * np.percentile(values, 99)) if values else None

@@ -4,10 +4,13 @@ The observers are the umpire: they see every computer's bus, which no computer o
 """
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+import msgspec
 
 from bootprint.bus import Envelope
-from bootprint.clock import EventClock
+from bootprint.clock import NS_PER_S, EventClock
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import Mode, Position, Track
 from bootprint.recording import Recorder
@@ -20,8 +23,25 @@ _INTERVAL_S = 0.02  # host time between two looks: what latencies are too long b
 _FLUSH_LOOKS = 50
 
 
+def in_umpires_time(track: Track, now_ns: int, jumps_s: Collection[float]) -> Track:
+    """A report of somebody else by a hub whose clock may jump by so much: its ages stay, its clock's error goes.
+
+    A hub tells reports in its own time. It went by the clock that makes its receipt the nearest to now.
+    """
+    if track.received_ns is None:
+        return track
+    ahead_s = (track.received_ns - now_ns) / NS_PER_S
+    wrong_ns = round(min((0.0, *jumps_s), key=lambda jump_s: abs(ahead_s - jump_s)) * NS_PER_S)
+    return msgspec.structs.replace(
+        track, time_ns=track.time_ns - wrong_ns, received_ns=track.received_ns - wrong_ns
+    )
+
+
 class Observers:
-    """Collect from every computer's bus (by its router) until closed; with a recorder, everything is recorded."""
+    """Collect from every computer's bus (by its router) until closed; with a recorder, everything is recorded.
+
+    ``jumps_s``: by how much an exercise sets clocks of hubs wrong, by computer.
+    """
 
     def __init__(
         self,
@@ -30,10 +50,12 @@ class Observers:
         clock: EventClock,
         frame: LocalFrame,
         recorder: Recorder | None = None,
+        jumps_s: Mapping[str, Collection[float]] | None = None,
     ) -> None:
         self._clock = clock
         self._frame = frame
         self._recorder = recorder
+        self._jumps_s = jumps_s or {}
         self._lock = threading.Lock()
         self._heard = {computer: Heard() for computer in routers}
         self._buses: dict[str, ZenohBus] = {}
@@ -72,6 +94,9 @@ class Observers:
 
     def _take(self, computer: str, envelope: Envelope, now_ns: int) -> None:
         message = envelope.message
+        if isinstance(message, Track) and message.soldier != computer and computer in self._jumps_s:
+            message = in_umpires_time(message, now_ns, self._jumps_s[computer])
+            envelope = replace(envelope, message=message)
         arrived_ns = now_ns
         if isinstance(message, Track) and message.received_ns is not None:
             arrived_ns = message.received_ns  # when the hub had it, not when we looked
@@ -80,7 +105,7 @@ class Observers:
             is_own = heard.take(envelope, arrived_ns, self._frame)
             if is_own and isinstance(message, Track) and message.mode in _SENSED:
                 latency_s = self._clock.host_seconds_since(message.time_ns)
-                heard.latency_s += [] if latency_s is None else [latency_s]
+                heard.latencies += [] if latency_s is None else [(message.time_ns, latency_s)]
 
     def alive(self, computer: str) -> set[str]:
         """Names of the services that run on a computer, by what they say of their health."""

@@ -210,7 +210,7 @@ class Runner:
 
     def result(self) -> "Result":
         """The score of what was played."""
-        from proving_ground.exercises.heard import latency_p99_ms
+        from proving_ground.exercises.heard import latencies_ms
         from proving_ground.exercises.result import Played, result_of
 
         stage = self._stage
@@ -222,7 +222,7 @@ class Runner:
             "mode": "processes",
             "speed": stage.speed,
             "processes": len(stage.processes.pids),
-            "latency_p99_ms": latency_p99_ms(list(heard.values())),
+            **latencies_ms(list(heard.values()), stage.start_ns),
             "usage": self._usage,
         }
         played = Played(stage.exercise, stage.start_ns, duration_s, heard, nets, tuple(stage.outages))
@@ -232,7 +232,7 @@ class Runner:
         from proving_ground.exercises.usage import UsageMeter
 
         if self._meter is None and self._stage.elapsed_s >= 0.0:
-            self._meter = UsageMeter(self._stage.processes.pids)
+            self._meter = UsageMeter(self._stage.processes.all_pids)
         self._stage.play_faults()
         self._stage.processes.check()
         return self._stage.elapsed_s < self._length_s and not self._stop.is_set()

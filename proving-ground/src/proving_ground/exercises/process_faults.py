@@ -1,4 +1,4 @@
-"""Faults of an exercise of real processes: what is killed is back when its supervisor would have it back.
+"""Faults of an exercise of real processes: what is killed is back when `bootprint up` would have it back, at once.
 
 The nets play ``radio_gone`` and ``net_parted``, the runs sensors' faults; all others are played here. Limits stand
 in for a full disk (no file of the computer's processes may grow) and for want of memory (none gets more than it
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from bootprint.processes import end_of
+from bootprint.upkeep import LOOK_S
 from proving_ground.exercises.bus_flood import BusFlood
 from proving_ground.exercises.exercise import Fault
 from proving_ground.exercises.line import killed_by
@@ -24,8 +25,6 @@ from proving_ground.exercises.line import killed_by
 if TYPE_CHECKING:
     from proving_ground.exercises.stage import Stage
 
-PAUSE_S: Final = 0.5
-"""Host seconds until a process that was killed is started again, as by `bootprint up`."""
 _ROUTER_GONE_S: Final = 2.0
 _PLAYED: Final = frozenset(
     (
@@ -104,7 +103,7 @@ class ProcessFaults:
     def _kill(self, fault: Fault) -> None:
         (service,) = killed_by(fault)
         self._gone(fault, service)
-        self._starting.append((time.monotonic() + PAUSE_S, fault.target, service))
+        self._starting.append((time.monotonic() + LOOK_S, fault.target, service))
 
     def _gone(self, fault: Fault, service: str) -> None:
         self._stage.processes.kill(f"{fault.target}/{service}")
@@ -150,7 +149,7 @@ class ProcessFaults:
     def _set_clock(self, fault: Fault, jump_s: float) -> None:
         self._gone(fault, "sa-hub")
         self._stage.jumps_s[fault.target] = jump_s
-        self._starting.append((time.monotonic() + PAUSE_S, fault.target, "sa-hub"))
+        self._starting.append((time.monotonic() + LOOK_S, fault.target, "sa-hub"))
 
     def _fill_disk(self, fault: Fault) -> None:
         self._limit(fault.target, resource.RLIMIT_FSIZE, lambda _: 0)
@@ -192,7 +191,7 @@ class ProcessFaults:
             computer, service = name.split("/", 1)
             self._stage.observers.forget(computer, service)
             self.outages.append(Outage(None, computer, service, time.monotonic(), end_of(code)))
-            self._starting.append((time.monotonic() + PAUSE_S, computer, service))
+            self._starting.append((time.monotonic() + LOOK_S, computer, service))
         for item in [item for item in self._starting if item[0] <= time.monotonic()]:
             self._starting.remove(item)
             self._start(item[1], item[2])

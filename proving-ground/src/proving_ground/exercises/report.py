@@ -136,7 +136,8 @@ def _usage(result: Result) -> str:
     return (
         f"<h2>Processes</h2>{html_table(by_service(rows))}"
         "<p class=note>Per cent of one processor while the exercise ran; memory is the proportional share (PSS). "
-        "The umpire is the exercise itself: all computers' routers, the emulated nets and the observers.</p>"
+        "The umpire is the exercise itself: all computers' routers, the emulated nets and the observers. "
+        "Services are forked from the fork-server, and share what it has imported.</p>"
         f"<details><summary>every process</summary>{html_table(rows)}</details>"
     )
 

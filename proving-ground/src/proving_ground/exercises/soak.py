@@ -46,8 +46,9 @@ def soak(
     (port,) = free_ports(1, socket.SOCK_STREAM)
     with closing(EmbeddedRouter(f"tcp/127.0.0.1:{port}")) as router:
         _write(folder, exercise, router.endpoint)
-        with ProcessGroup() as group, closing(open_bus(router.endpoint)) as bus:
-            for service in (*SOLDIER_SERVICES, GATEWAY):
+        services = (*SOLDIER_SERVICES, GATEWAY)
+        with ProcessGroup(forked=services) as group, closing(open_bus(router.endpoint)) as bus:
+            for service in services:
                 group.start(_spec(folder, service, router.endpoint, clock))
             heard = _listen(group, bus, exercise.identity(_SOLDIER), 60.0 * minutes)
     typer.echo(memory_growth({_SOLDIER: heard}))

@@ -20,7 +20,6 @@ from bootprint.errors import BootprintError, ConfigError
 from bootprint.geodesy import LocalFrame
 from bootprint.processes import ProcessGroup, ProcessSpec
 from bootprint.recording import Recorder
-from bootprint.service import DEFAULT_BEAT_S
 from bootprint.stopping import Stop
 from bootprint.zenoh_bus import EmbeddedRouter
 from pdr_engine.foot import warm_up
@@ -88,7 +87,7 @@ class Stage:
         self.frame = LocalFrame(exercise.origin)
         self.start_ns = 0
         self.page_address: str | None = None
-        self.processes = ProcessGroup()
+        self.processes = ProcessGroup(forked=(*SOLDIER_SERVICES, GATEWAY))  # as `bootprint up` does
         self.nets: dict[str, EmulatedNet] = {}
         self.observers: Observers
         self._play = play
@@ -122,7 +121,9 @@ class Stage:
             write_computer(self._play.folder, self.exercise, computer, self._endpoints[computer], ports)
         if self._play.record is not None:
             self._recorder = self._stack.enter_context(Recorder(self._play.record, overwrite=True))
-        self.observers = Observers(self._endpoints, REALM, self.clock, self.frame, self._recorder)
+        self.observers = Observers(
+            self._endpoints, REALM, self.clock, self.frame, self._recorder, self.exercise.clock_jumps_s
+        )
         self._stack.callback(self.observers.close)
         self._stack.enter_context(self.processes)
         if self._play.serial:
@@ -221,7 +222,7 @@ class Stage:
                     *("--clock-origin", f"{self._origin_s:.6f}"),
                     *("--clock-offset", f"{self._clock_off_s(computer, service):g}"),
                     *("--router-wait", "30"),
-                    *("--beat", f"{self._beat_s():.3f}"),
+                    *self._beat(),
                 ),
                 log=folder / f"{service}.log",
                 append=True,
@@ -232,10 +233,11 @@ class Stage:
         """By how many host seconds a process's clock is off."""
         return self.jumps_s.get(computer, 0.0) / self._play.speed if service == HUB else 0.0
 
-    def _beat_s(self) -> float:
-        """As often as one soldier's computer looks at its bus, if the machine has the processors for it."""
+    def _beat(self) -> tuple[str, ...]:
+        """Services look at their bus as often as they choose, if the machine has the processors for it."""
         of_each = len(self.exercise.computers) / (os.cpu_count() or 1)
-        return next((beat_s for computers, beat_s in _BUSY_BEATS_S if of_each > computers), DEFAULT_BEAT_S)
+        beats_s = [beat_s for computers, beat_s in _BUSY_BEATS_S if of_each > computers]
+        return ("--beat", f"{beats_s[0]:.3f}") if beats_s else ()
 
     def wait_ready(self, stop: Stop, on_progress: OnProgress = lambda _done, _of: None) -> None:
         """Start all services but the gateways; StageError names those that do not come up."""

@@ -32,9 +32,7 @@ _SHORT_ROWS = 20  # a longer table gives way to a summary on the terminal
 
 def print_scores(result: Result) -> None:
     """The score tables on standard output; of a crowd their medians and worst."""
-    console = Console()
-    if not console.is_terminal:
-        console.width = _FILE_WIDTH  # a file or a pipe has no columns to save
+    console = _console()
     for key, title in TABLES:
         rows = result.figures[key]
         if len(rows) > _SHORT_ROWS:
@@ -45,8 +43,23 @@ def print_scores(result: Result) -> None:
         console.print(_terminal_table([result.figures["faults_summary"]], "All faults"))
     if "usage" in result.figures:
         console.print(_terminal_table(by_service(result.figures["usage"]), "Processes"))
-        latency = cell(result.figures["latency_p99_ms"])
-        console.print(f"latency sensor to track, p99: {latency} ms", highlight=False)
+        settled, starting = (cell(result.figures[f"latency_{name}_ms"]) for name in ("p99", "start_p99"))
+        console.print(
+            f"latency sensor to track, p99: {settled} ms; in the first ten seconds {starting} ms",
+            highlight=False,
+        )
+
+
+def print_rows(rows: Sequence[Mapping[str, Any]], title: str) -> None:
+    """One table on standard output."""
+    _console().print(_terminal_table(rows, title))
+
+
+def _console() -> Console:
+    console = Console()
+    if not console.is_terminal:
+        console.width = _FILE_WIDTH  # a file or a pipe has no columns to save
+    return console
 
 
 def _terminal_table(rows: Sequence[Mapping[str, Any]], title: str) -> Table:

@@ -71,12 +71,14 @@ def _processor() -> str:
 
 
 def _tables(sizes: list[int], seconds: float) -> Iterator[tuple[str, Table]]:
+    from proving_ground.evaluation import fusion_benchmark
     from proving_ground.performance.bus_throughput import bus_throughput
     from proving_ground.performance.estimators import estimators
     from proving_ground.performance.playing import cost_of, starts
 
     yield "Estimators and the hub", estimators()
     yield "The bus of one computer", bus_throughput(20_000)
+    yield "One soldier with everything", fusion_benchmark.table(fusion_benchmark.measure(seconds))
     with tempfile.TemporaryDirectory() as folder:
         yield "Start", starts(Path(folder, "starts"), turns=5)
         for size in sizes:

@@ -34,9 +34,12 @@ Soldiers walk round yards for {seconds:g} s, every service a process of its own,
 this one machine: squads of eight with a leader's computer, and a command post. Each row is the mean of a service's
 processes. Memory is the proportional share (PSS): what processes share counts once. Latency is from the stamp of
 the newest sample that a message tells of until the message is on the computer's bus, at the first four soldiers';
-it adds up from row to row. `umpire` is the exercise itself: all routers, radio nets and observers. Start is of a
-process that is killed and started again while its soldier walks, until its first word. The foot filter is one
-boot's, in batches of ten samples, the body module's unit runs at 100 Hz, and the hub is a command post's.
+it adds up from row to row. `umpire` is the exercise itself: all routers, radio nets and observers; services are
+forked from the `fork-server`, as by `bootprint up`, and share what it has imported. Start is of a process that is
+killed and started again while its soldier walks, until its first word. The foot filter is one boot's, in batches of
+ten samples, the body module's unit runs at 100 Hz, and the hub is a command post's. The soldier with everything
+wears both boots, a body unit, a receiver and a camera; what a position waits for by design (batches, look-ahead,
+order) is told by the same sensors played in event time.
 """
 
 

@@ -28,13 +28,13 @@ def cost_of(soldiers: int, seconds: float, folder: Path) -> Table:
     """Processor, memory and latency by service over so many seconds of walking."""
     exercise = walking_squads(soldiers, seconds + _SETTLE_S)
     with Stop() as stop, Stage(exercise, Play(folder)) as stage:
-        _walk(stage, stop)
+        walk(stage, stop)
         heard = [(exercise.identity(one.id), stage.endpoint(one.id)) for one in exercise.soldiers[:_HEARD]]
         with closing(Latencies(stage.clock, heard)) as latencies:
-            _until(stage, stop, _SETTLE_S)
-            meter = UsageMeter(stage.processes.pids)
+            walk_until(stage, stop, _SETTLE_S)
+            meter = UsageMeter(stage.processes.all_pids)
             latencies.begin()
-            _until(stage, stop, _SETTLE_S + seconds)
+            walk_until(stage, stop, _SETTLE_S + seconds)
             rows = by_service(meter.rows())
         return {str(row["service"]): _cells(row, latencies) for row in rows}
 
@@ -49,8 +49,8 @@ def starts(folder: Path, turns: int) -> Table:
     """Each service of a soldier who walks, killed and started again: until its first word, and processor time."""
     exercise = walking_squads(1, _SPARE_S + turns * len(SAID_BY) * 4.0)
     with Stop() as stop, Stage(exercise, Play(folder)) as stage:
-        _walk(stage, stop)
-        _until(stage, stop, _SETTLE_S)
+        walk(stage, stop)
+        walk_until(stage, stop, _SETTLE_S)
         soldier = exercise.soldiers[0].id
         found = {service: [_restart(stage, soldier, service) for _ in range(turns)] for service in SAID_BY}
     return {service: _medians(each) for service, each in found.items()}
@@ -80,12 +80,13 @@ def _medians(turns: list[tuple[float, float, float]]) -> dict[str, float | None]
     }
 
 
-def _walk(stage: Stage, stop: Stop) -> None:
+def walk(stage: Stage, stop: Stop) -> None:
+    """Start everything, and the walks."""
     stage.wait_ready(stop)
     stage.start_walks(stop)
 
 
-def _until(stage: Stage, stop: Stop, elapsed_s: float) -> None:
+def walk_until(stage: Stage, stop: Stop, elapsed_s: float) -> None:
     """Wait for that moment of the exercise; an error if a process ends, or somebody wants to."""
     while stage.elapsed_s < elapsed_s:
         stage.processes.check()

@@ -111,7 +111,9 @@ class Boots(Company):
         if math.hypot(*foot.offset[:2]) <= reach_m:
             return False
         here = body.foot_position(self.filter.state, (foot.block, foot.offset))
-        return any(math.dist(here[:2], other.at(now_ns)[:2]) > reach_m for other in self.others(foot, now_ns))
+        return any(
+            math.dist(here[:2], other.trail.at(now_ns)[:2]) > reach_m for other in self.others(foot, now_ns)
+        )
 
     def _was_left_behind(self, foot: Foot, now_ns: int) -> bool:
         """Whether others walked on while this foot was silent: only its next step tells what it has missed.
@@ -161,7 +163,7 @@ class Boots(Company):
 
     def _drop(self, foot: Foot) -> None:
         foot.active, foot.strayed, foot.joining, foot.own = False, False, None, np.zeros(4)
-        foot.samples.clear()
+        foot.trail.clear()
         self.coupling.restart()
         if self.reference is foot:
             self.reference = next((other for other in self.feet.values() if other.carries), self.stand_in)
@@ -209,15 +211,14 @@ class Boots(Company):
         point = body.foot_position(self.filter.state, (foot.block, foot.offset))
         if self.filter.tape is not None:
             self.filter.tape.mark(time_ns, foot.block, foot.offset, point, foot.own if joined else None)
-        if not foot.samples or time_ns > foot.samples[-1][0]:
-            foot.samples.append((time_ns, point))
-        else:
-            foot.samples[-1] = (foot.samples[-1][0], point)
+        foot.trail.put(time_ns, point)
 
     # --- two feet, one body ------------------------------------------------------------------------------------
 
     def _couple(self, foot: Foot, step: FootStep, moved: Vector3, turn_rad: float) -> None:
         """Hold the feet together as one passes the other; a foot that is lost has to leave."""
+        if self.carried_ns is not None and step.time_ns <= self.carried_ns:
+            return  # it comes late: others have told of that time, and the other foot is elsewhere by now
         foot.stepped = True
         coasting_s = self._config.silence.coasting_s
         for other in self.others(foot, step.time_ns):
@@ -261,7 +262,7 @@ class Boots(Company):
         innovation = self.filter.update(measurement)
         for foot in self.everybody():
             by = self.filter.state[foot.block.position] - before[foot.block.position]
-            foot.relocate(by.__add__)
+            foot.trail.carry(by)
         return innovation
 
     def carry(self, by_m: Array, covariance: Array, until_ns: int | None = None) -> None:
@@ -273,14 +274,15 @@ class Boots(Company):
         if until_ns is not None:
             self.carried_ns = max(self.carried_ns or until_ns, until_ns)
         for foot in self.everybody():
-            foot.relocate(by_m.__add__)
+            foot.trail.carry(by_m)
 
     def move(self, transform: RigidTransform) -> None:
         """Carry everything into another frame."""
-        self.filter.transform(transform)
+        sighted = self.reference if transform.sighted is not None else None
+        self.filter.transform(transform, None if sighted is None else sighted.block)
         self.in_enu = True
         for foot in self.everybody():
-            foot.relocate(lambda point: transform.point(xyz(point)))
+            foot.trail.transform(transform)
             if foot.joining is not None:
                 foot.joining.relocate(transform)
 
@@ -302,7 +304,9 @@ class Boots(Company):
         """Where the body was then, over the mean of these, (3,) m; the origin if there are none."""
         if not alive:
             return np.zeros(3)
-        return sum((foot.at(now_ns) for foot in alive), np.zeros(3)) / len(alive) + self.ahead(alive, now_ns)
+        return sum((foot.trail.at(now_ns) for foot in alive), np.zeros(3)) / len(alive) + self.ahead(
+            alive, now_ns
+        )
 
     def spread_of(self, alive: Sequence[Foot]) -> Array:
         """Covariance (3, 3) of the body's position over these, in the filter's frame, m²."""
@@ -319,7 +323,7 @@ class Boots(Company):
 
     def moved_since(self, time_ns: int) -> Array | None:
         """How far the body went since then, by its feet, (3,) m; None if that is not remembered."""
-        moves = [foot.moved_since(time_ns) for foot in self.alive(time_ns)]
+        moves = [foot.trail.moved_since(time_ns) for foot in self.alive(time_ns)]
         known = [move for move in moves if move is not None]
         if len(known) < len(moves):
             return None

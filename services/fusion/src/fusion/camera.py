@@ -93,6 +93,7 @@ class Camera:
     def note_move(self, transform: RigidTransform) -> None:
         """The filter has changed its frame."""
         self._since = None
+        self._along.turn(transform.yaw_rad)
         if self._joining is not None:
             self._joining.relocate(transform)
 
@@ -108,9 +109,13 @@ class Camera:
         if self.foot is not None and not self.is_reference:
             self._leave(self.foot)
 
-    def take_back(self, place: str, step: FootStep) -> None:
-        """A foot tells, late, of a time in which the camera took it along."""
-        self._along.take_back(self._boots, self._boots.feet[place], step)
+    def take_back(self, place: str, step: FootStep) -> Array:
+        """A foot is about to tell, late, of a time in which the camera took it along; what to put on afterwards."""
+        return self._along.take_back(self._boots, self._boots.feet[place], step)
+
+    def put_on(self, place: str, moved: Array) -> None:
+        """The late step has been composed."""
+        self._along.put_on(self._boots, self._boots.feet[place], moved)
 
     def shift(self, by_ns: int) -> None:
         """The clock has been set: the chain starts anew, the place is kept."""
@@ -196,7 +201,7 @@ class Camera:
 
     def _leave(self, foot: Foot) -> None:
         foot.active = False
-        foot.samples.clear()
+        foot.trail.clear()
         self._own, self._joining, self._since = np.zeros(4), None, None
         self._boots.dismiss()
 
@@ -217,7 +222,7 @@ class Camera:
             return
         if self._joining is None or self._joining.is_hopeless:
             self._joining = Joining(together=False)
-        place = np.mean([foot.at(step.time_ns) for foot in feet if foot.samples], axis=0)
+        place = np.mean([foot.trail.at(step.time_ns) for foot in feet if foot.trail], axis=0)
         self._joining.add(_xyz(self._own), _xyz(place))
         move = self._joining.fit(self._join_config)
         if move is None:

@@ -95,9 +95,9 @@ class Company:
 
 def _went(one: Foot | None, foot: Foot, now_ns: int) -> Array:
     """How far ``one`` went, up to now, since the foot was last somewhere; zero if it does not remember."""
-    if one is None or one is foot or not (one.samples and foot.samples):
+    if one is None or one is foot or not (one.trail and foot.trail):
         return np.zeros(3)
-    since_ns = foot.samples[-1][0]
-    if now_ns <= since_ns or since_ns < one.samples[0][0]:
+    since_ns = foot.trail.span_ns[1]
+    if now_ns <= since_ns or since_ns < one.trail.span_ns[0]:
         return np.zeros(3)
-    return np.asarray(one.at(now_ns) - one.at(since_ns))
+    return np.asarray(one.trail.at(now_ns) - one.trail.at(since_ns))

@@ -170,6 +170,7 @@ class FeetConfig(Config, frozen=True):
     reach_m: Positive = 3.0  # feet are never further apart, running neither
     gate_probability: Probability = 0.999
     join_sigma_m: Positive = 0.3  # where a foot stands beside the other
+    join_distance_m: Positive = 4.0  # of a straight walk that shows how a foot lies beside the other
     join_fit_sigma_m: Positive = 0.12  # of one stance as the other foot has it, while a foot joins
     max_speed_m_s: Positive = 12.0  # a step faster than this is a fault of the sensor
 

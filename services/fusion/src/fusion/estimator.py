@@ -104,9 +104,10 @@ class Estimator:
         """A foot has made a step."""
         self._take_start(step)
         self._body.take_back(self.boots, self._aid.boots, step)
-        self._camera.take_back(place, step)
+        taken_along = self._camera.take_back(place, step)
         dropped = self._counters["feet_dropped"]
         foot = self.boots.step(place, step)
+        self._camera.put_on(place, taken_along)
         self._facing.step(place, step)
         self._aid.step(place, step)
         if self._counters["feet_dropped"] > dropped:

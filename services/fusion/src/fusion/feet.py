@@ -2,7 +2,6 @@
 
 import math
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,6 +10,7 @@ from bootprint.clock import NS_PER_S
 from bootprint.messages import FootPose, FootStep, MotionClass, Vector3, upper_triangle
 from fusion.joining import Joining
 from fusion.state import Array, FootBlock
+from fusion.trail import Trail
 
 MOVING_M = 0.1  # a shorter step is standing
 _MOST_MISSING = 1000
@@ -18,7 +18,6 @@ COARSE_STEP = np.diag([0.1, 0.1, 0.1, 0.05]) ** 2  # for a step that states no c
 _SAME_STANCE_NS = 300_000_000  # a pose so long before a step's start is of the same stance
 _POOR, _GOOD = 0.2, 0.5  # mean quality of recent strides
 _RECENT = 6  # strides by which a foot is judged
-_SAMPLES = 64  # of poses and steps: about five seconds
 _GAP_S = 1.0  # between one step's end and the next one's start: more is time nobody saw
 _LONGEST_GAP_S = 60.0  # after this nothing is known anyway
 
@@ -116,7 +115,7 @@ class Foot:
     strayed: bool = False  # its poses are out of the other foot's reach: it stands for nothing until it steps
     stepped: bool = False  # since the feet were last coupled
     recent: deque[Stride] = field(default_factory=lambda: deque(maxlen=_RECENT))
-    samples: deque[tuple[int, Array]] = field(default_factory=lambda: deque(maxlen=_SAMPLES))
+    trail: Trail = field(default_factory=Trail)
 
     @property
     def place(self) -> str:
@@ -204,39 +203,8 @@ class Foot:
         """A message of this foot with this stamp has been handled."""
         self.heard_ns = time_ns if self.heard_ns is None else max(self.heard_ns, time_ns)
 
-    def at(self, time_ns: int) -> Array:
-        """Where the foot was, between the samples around that time (the nearest one beyond them), (3,) m."""
-        before = self.samples[0]
-        for sample in self.samples:
-            if sample[0] > time_ns:
-                return _between(before, sample, time_ns)
-            before = sample
-        return before[1]
-
-    def moved_since(self, time_ns: int) -> Array | None:
-        """How far the foot went since then, (3,) m; None if that is not remembered."""
-        if not self.samples or time_ns < self.samples[0][0]:
-            return None
-        moved: Array = self.samples[-1][1] - self.at(time_ns)
-        return moved
-
     def shift(self, by_ns: int) -> None:
         """The clock has been set: what was remembered by the old one."""
         self.end_ns = None if self.end_ns is None else self.end_ns + by_ns
         self.heard_ns = None if self.heard_ns is None else self.heard_ns + by_ns
-        moved = [(time_ns + by_ns, point) for time_ns, point in self.samples]
-        self.samples.clear()
-        self.samples.extend(moved)
-
-    def relocate(self, to: Callable[[Array], Array]) -> None:
-        """The filter has moved this foot; where it was of late moves with it."""
-        moved = [(time_ns, to(point)) for time_ns, point in self.samples]
-        self.samples.clear()
-        self.samples.extend(moved)
-
-
-def _between(before: tuple[int, Array], after: tuple[int, Array], time_ns: int) -> Array:
-    if time_ns <= before[0]:
-        return before[1]
-    share = (time_ns - before[0]) / (after[0] - before[0])
-    return before[1] + share * (after[1] - before[1])
+        self.trail.shift(by_ns)

@@ -250,8 +250,11 @@ class StateFilter:
         state[block.all] = pose
         self._advance(state, transition, process)
 
-    def transform(self, move: RigidTransform) -> None:
-        """Carry the whole state into another frame; the move's own error becomes common to all feet."""
+    def transform(self, move: RigidTransform, sighted: FootBlock | None = None) -> None:
+        """Carry the whole state into another frame; the move's own error becomes common to all feet.
+
+        ``sighted``: by whom the move took its direction, if anybody.
+        """
         jacobian = np.eye(self.layout.size)
         common = np.zeros((self.layout.size, FOOT_SIZE))
         state = self.state.copy()
@@ -259,6 +262,9 @@ class StateFilter:
             jacobian[block.all, block.all] = move.pose_jacobian()
             state[block.all] = move.pose(self.state[block.all])
             common[block.all] = move.error_jacobian(self._position(block))
+        if sighted is not None:
+            plane = slice(sighted.start, sighted.start + 2)
+            jacobian[:, plane] += np.outer(common[:, 3], move.turn_response())
         self._advance(state, jacobian, common @ move.covariance @ common.T, "frame")
 
     def _position(self, block: FootBlock) -> Vector3:

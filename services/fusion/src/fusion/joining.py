@@ -47,7 +47,7 @@ class Joining:
         return len(self.own) >= _MOST_PAIRS
 
     def fit(self, config: FusionConfig) -> RigidTransform | None:
-        """From the foot's own frame into the filter's, once as sure as a straight walk of ``align.distance_m`` is.
+        """From the foot's own frame into the filter's, once as sure as a straight walk of ``join_distance_m`` is.
 
         None while it is not, or while the two tracks do not look like one walk.
         """
@@ -57,7 +57,7 @@ class Joining:
         sigma_m = config.boots.join_fit_sigma_m
         fit = fit_rigid(own[:, :2], beside[:, :2], sigma_m**2 * np.eye(len(own)))
         unlike = fit.chi_square > chi_square_quantile(config.boots.gate_probability, 2 * len(own) - 3)
-        if unlike or math.sqrt(fit.covariance[2, 2]) > sigma_m / config.align.distance_m:
+        if unlike or math.sqrt(fit.covariance[2, 2]) > sigma_m / config.boots.join_distance_m:
             return None
         covariance = np.diag([config.boots.join_sigma_m**2] * 3 + [float(fit.covariance[2, 2])])
         return RigidTransform(

@@ -50,7 +50,7 @@ class Outside:
         """Where the foot beside stands; who does not stride, a camera, was there in the middle of the step."""
         if beside.block in self._filter.layout.blocks:
             return xyz(self._filter.state[beside.block.position])
-        return xyz(beside.at((step.start_time_ns + step.time_ns) // 2))
+        return xyz(beside.trail.at((step.start_time_ns + step.time_ns) // 2))
 
     def _join(self, foot: Foot, beside: Foot, joining: Joining) -> None:
         move = joining.fit(self._config)

@@ -32,6 +32,7 @@ UNKNOWN_UP_SIGMA_M = 100.0
 _STANCE_SIGMA_M = 0.3  # the body is not exactly over the foot whose track is fitted
 _SPACING_M = 1.0  # places nearer to each other tell no direction
 _MOST_PLACES = 60
+_BEGINNING = (0.0, 0.0, 0.0)  # of the boots frame, where nothing has erred
 _CROOKED = 1.5  # a path so much longer than its chord is not straight
 
 
@@ -70,15 +71,19 @@ class HeadingHint:
     walk: Walk
     turn_rad: float = 0.0
     turn_sigma_rad: float = math.inf
+    # ... if that is the newest one, of a walk from where the frame begins: its end
+    sighted: Vector3 | None = None
 
     def go(self, to: Vector3, align: AlignConfig) -> None:
         """The soldier has made a step to here."""
         self.walk.go(to)
+        self.sighted = None
         if self.walk.chord_m < align.provisional_m:
             return
         sigma = math.hypot(self.sigma_rad, self.walk.sigma_rad(align))
         if sigma < self.turn_sigma_rad:
             self.turn_rad, self.turn_sigma_rad = wrap_angle(self.yaw_rad - self.walk.direction_rad), sigma
+            self.sighted = to if self.place.local == _BEGINNING else None
 
     @property
     def is_begun(self) -> bool:
@@ -188,7 +193,7 @@ class Placement:
         horizontal = place.sigma_m**2
         up_sigma = UNKNOWN_UP_SIGMA_M if place.up_sigma_m is None else place.up_sigma_m
         covariance = np.diag([horizontal, horizontal, up_sigma**2, hint.turn_sigma_rad**2])
-        return RigidTransform(place.local, place.enu, hint.turn_rad, covariance)
+        return RigidTransform(place.local, place.enu, hint.turn_rad, covariance, hint.sighted)
 
     def _fit_tracks(self) -> None:
         """Fit the walked track to the places; a worst one that cannot be true is dropped and the rest waits."""

@@ -17,12 +17,17 @@ from fusion.state import Array
 
 @dataclass(frozen=True, slots=True)
 class RigidTransform:
-    """A turn about up and a shift; ``covariance`` (4, 4) of (east, north, up m, yaw rad) at the target."""
+    """A turn about up and a shift; ``covariance`` (4, 4) of (east, north, up m, yaw rad) at the target.
+
+    ``sighted``: the turn is such that who stands there, in the old frame, comes to lie in a known direction from
+    the target. So it takes back what their way from the pivot has erred aside.
+    """
 
     pivot: Vector3
     target: Vector3
     yaw_rad: float
     covariance: Array
+    sighted: Vector3 | None = None
 
     def point(self, local: Vector3) -> Array:
         """A point of the old frame in the new one, (3,) m."""
@@ -51,6 +56,13 @@ class RigidTransform:
         jacobian = np.eye(4)
         jacobian[:2, 3] = (-north, east)
         return jacobian
+
+    def turn_response(self) -> Array:
+        """``∂yaw/∂(east, north m)`` of who was sighted, in the old frame, (2,); zeros if nobody was."""
+        if self.sighted is None:
+            return np.zeros(2)
+        east, north, _ = _minus(self.sighted, self.pivot)
+        return np.array([north, -east]) / (east**2 + north**2)
 
 
 def _minus(one: Vector3, other: Vector3) -> Vector3:

@@ -138,6 +138,7 @@ class Trunk:
             length_sigma_m=step.length_sigma_m,
             azimuth_rad=self._true(step.azimuth_rad),
             azimuth_sigma_rad=step.azimuth_sigma_rad,
+            track_azimuth_rad=self._true(step.track_azimuth_rad),
             motion=step.motion,
             direction=step.direction,
             class_pct=100.0 * step.class_probability,

@@ -256,6 +256,13 @@ SERVICE = Service(
 )
 
 
+def preload() -> None:
+    """What a started service needs beyond this module (`bootprint.fork_server`)."""
+    import sa_hub.radio.links.udp  # noqa: F401
+
+    SERVICE.preload()
+
+
 def main() -> None:
     """The console script."""
     SERVICE.main()

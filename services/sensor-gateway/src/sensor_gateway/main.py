@@ -17,6 +17,13 @@ SERVICE = Service(
 )
 
 
+def preload() -> None:
+    """What a started service needs beyond this module (`bootprint.fork_server`)."""
+    import sensor_gateway.gateway  # noqa: F401
+
+    SERVICE.preload()
+
+
 def main() -> None:
     """Run the service."""
     SERVICE.main()

@@ -18,6 +18,9 @@ class BodyStepEstimate:
     magnetometer (then ``azimuth_sigma_rad`` says that nothing is known). ``gyro_azimuth_rad`` has seen the compass
     once, at the start; ``satellite_azimuth_rad`` is that of the newest stretch between good fixes.
 
+    ``track_azimuth_rad`` is the same in the track's own frame, which is not turned when the compass tells north
+    better while one walks: a track of steps added up by it keeps its shape, and may be turned as a whole.
+
     ``length_sigma_m`` and ``azimuth_sigma_rad`` hold all of a step's error; all steps of a walk share
     ``common_scale_sigma`` of the length and, per second, ``common_turn_sigma_rad_s``; a step's own direction is
     ``own_turn_sigma_rad`` from the trunk's, and the azimuth walks by ``azimuth_walk_rad`` from step to step.
@@ -31,6 +34,7 @@ class BodyStepEstimate:
     length_m: float
     length_sigma_m: float
     azimuth_rad: float
+    track_azimuth_rad: float
     azimuth_sigma_rad: float
     motion: MotionClass
     direction: Direction

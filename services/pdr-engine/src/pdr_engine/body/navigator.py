@@ -11,6 +11,7 @@ from itertools import repeat
 from bootprint.geomagnetism import EarthField
 from bootprint.messages import Direction, Float64Array, Int64Array
 from pdr_engine.body.altitude.heights import Height, Heights
+from pdr_engine.body.altitude.stairways import Stairways
 from pdr_engine.body.azimuth.ahead import Ahead
 from pdr_engine.body.azimuth.bearings import Bearing, Bearings
 from pdr_engine.body.azimuth.deviation import Deviation
@@ -56,6 +57,7 @@ class BodyNavigator:
         self._footfalls = Footfalls(self.settings.steps, self._strides)
         self._bearings = Bearings(self.settings)
         self._heights = Heights(self.settings.altitude)
+        self._stairways = Stairways()
         self._posture, self._feet = Posture(), Feet()
         self._lengths = StepLengths(self.settings.step_length, length)
         self._personal = PersonalScale(
@@ -216,7 +218,8 @@ class BodyNavigator:
     ) -> BodyStepEstimate:
         settings, sway = self.settings, self.settings.heading.sway_sigma_rad
         ahead_rad = self._ahead.angle_rad - self._misalignment.angle_rad
-        length, azimuth = self._way(cut, movement, bearing, height)
+        turn = 0.0 if self._misalignment.stretches else bearing.turn_rad  # satellites have told north better
+        length, azimuth = self._way(cut, movement, bearing, height, turn)
         if not bearing.disturbed:
             self._reliance.bias_updated(cut.end_ns)
         satellites = self._misalignment.satellite_azimuth(cut.end_ns)
@@ -231,6 +234,7 @@ class BodyNavigator:
             length_m=length,
             length_sigma_m=math.hypot(settings.length.sigma_share, self._personal.sigma) * length,
             azimuth_rad=azimuth % math.tau,
+            track_azimuth_rad=(azimuth - turn) % math.tau,
             azimuth_sigma_rad=math.hypot(self._heading_sigma(cut.end_ns, bearing), sway),
             motion=movement.motion,
             direction=movement.direction,
@@ -262,26 +266,36 @@ class BodyNavigator:
         )
 
     def _heading_sigma(self, time_ns: int, bearing: Bearing) -> float:
-        """Of the unit's azimuth, or of what satellites told of it if that is better."""
+        """Of the unit's azimuth; once satellites have told, of the track's or of what they told."""
         if not self._misalignment.stretches:
             return bearing.heading.sigma_rad
         drift = self.settings.heading.gyro_drift_rad_s
-        return min(bearing.heading.sigma_rad, self._misalignment.sigma_at(time_ns, drift))
+        return min(bearing.track.sigma_rad, self._misalignment.sigma_at(time_ns, drift))
 
     def _way(
-        self, cut: Cut, movement: Movement, bearing: Bearing, height: Height | None
+        self, cut: Cut, movement: Movement, bearing: Bearing, height: Height | None, turn_rad: float
     ) -> tuple[float, float]:
-        """Length and azimuth of a step as it is published; those who compare with satellites are told, too."""
+        """Length and azimuth of a step as it is published, ``turn_rad`` from the track's frame.
+
+        Those who compare tracks, with satellites or the way out, are told in that frame.
+        """
+        on_stairs = self._stairways.step(
+            movement.motion == "stairs", None if height is None else height.height_m
+        )
 
         def length_m(direction: Direction) -> float:
-            turn, motion = cut.turn_rate_rad_s, movement.motion
-            level = self._lengths.length(cut.gait, turn, motion, direction)
+            motion = movement.motion
+            if motion == "stairs" and on_stairs < 0.5:
+                motion = "walking"
+            level = self._lengths.length(cut.gait, cut.turn_rate_rad_s, motion, direction)
             slope = 0.0 if height is None else height.slope_rad(level / cut.gait.interval_s)
-            self._personal.meet(self._lengths.features(cut.gait, slope))
+            own_model = motion if direction in ("forward", "backward") else "unknown"
+            self._personal.meet(self._lengths.features(cut.gait, slope), own_model)
             return self._personal.factor * projected(self._lengths.on_slope(level, cut.gait, slope), slope)
 
-        told_rad = bearing.heading.azimuth_rad - self._ahead.angle_rad
+        told_rad = bearing.track.azimuth_rad - self._ahead.angle_rad
         length, azimuth = self._feet.go(movement, told_rad, length_m)
+        length_m(movement.direction)  # the one that fixes are to judge
         self._steps += 1
         self._personal.walk(length, azimuth)
         self._misalignment.walk(length, azimuth)
@@ -292,4 +306,4 @@ class BodyNavigator:
             length, azimuth = self._retrace.published(length, azimuth, learned)
         if self._bearings.repeated is not None:
             self._bearings.repeated.walk(length, azimuth)
-        return length, azimuth
+        return length, azimuth + turn_rad

@@ -13,6 +13,7 @@ import numpy as np
 from sa_hub.radio.ground import FloatArray
 from sa_hub.radio.history import allowed_cells
 from sa_hub.radio.layout import FAR_BITS, LATTICES, MISSES, NEAR_BITS, USUAL_LATTICES
+from sa_hub.radio.listeners import LOSSLESS
 from sa_hub.radio.picture import BoolArray, IntArray
 from sa_hub.radio.squad import MAX_SOLDIERS
 from sa_hub.radio.update_codec import MAX_ENTRIES
@@ -28,6 +29,7 @@ MOTION_BITS: Final = 6
 LEAST_ENTRY_BITS: Final = 2.0 * (min(reach for _, reach in LATTICES) + NEAR_BITS) + 2.0
 """Of a steady entry in a frame that varies: its place by the narrowest modulus, and how it is told."""
 RESOLUTIONS: Final = tuple(sorted({resolution for resolution, _ in LATTICES}))
+_UNSURE: Final = 5e-5
 _RICE_PARAMETERS: Final = (0, 2, 4, 6)
 _SQUAD_ENTRY_BITS: Final = 8
 
@@ -81,7 +83,7 @@ class Wares:
 
 @dataclass(frozen=True)
 class Terms:
-    """What bits cost: ``price`` per bit in the frame, ``frame_price`` of sending one at all, and room for how many.
+    """What bits cost: ``price`` per bit in the frame, ``frame_price`` of sending one (not 0); room for so many.
 
     ``delivered`` is the share of frames that are heard, ``least_misses`` what an update must allow for,
     ``entry_share``: an entry pays so much of its bits' price.
@@ -122,10 +124,10 @@ class Offer:
         return list(zip(self.far[picked].tolist(), self.steady[picked].tolist(), strict=True))
 
 
-def may_pay(gain: FloatArray, terms: Terms) -> bool:
-    """Whether any frame could: a quick look, since most of the time none does."""
+def frames_paid(gain: FloatArray, terms: Terms) -> float:
+    """How many frames' price telling could pay at most: a quick look, since most of the time it is none."""
     least_price = terms.entry_share * terms.price * LEAST_ENTRY_BITS
-    return float(np.maximum(gain - least_price, 0.0).sum()) > terms.frame_price
+    return float(np.maximum(gain - least_price, 0.0).sum()) / terms.frame_price
 
 
 def best_offer(wares: Wares, terms: Terms) -> Offer | None:
@@ -215,3 +217,10 @@ def _picked(surplus: FloatArray, bits: FloatArray, room_bits: float, most: int) 
     fits = np.cumsum(bits[order]) <= room_bits
     fits[:1] = True
     return order[fits]
+
+
+def least_misses(loss: float) -> int:
+    """What an update must allow for so that hardly anyone is left behind by chance."""
+    if loss < LOSSLESS:
+        return 0
+    return next((misses for misses in MISSES if loss ** (misses + 1) < _UNSURE), MISSES[-1])

@@ -5,19 +5,13 @@ will soon be elsewhere. So errors are looked at over the time until the next rep
 that is not told is told at the place that is nearest to all those where he will be: ahead of him.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
-
-import numpy as np
 
 from bootprint.prediction import reaches_s
 from sa_hub.radio.ground import FloatArray
+from sa_hub.radio.persistence import MOMENTS
 from sa_hub.radio.wares import Candidates
-
-_MOMENTS: Final = np.array([1.0, 3.0, 5.0]) / 6.0
-"""Of the time ahead: the middles of its thirds."""
 
 
 @dataclass(frozen=True)
@@ -29,18 +23,26 @@ class Outlook:
     ahead_s: float
 
     @cached_property
-    def moments(self) -> Sequence[tuple[FloatArray, float]]:
-        """At each moment: (n, 2) m that they will have gone, and the seconds by which velocities told reach."""
-        seconds = self.ahead_s * _MOMENTS
-        reaches = reaches_s(seconds)
-        return [(self.who.way_m(s), float(reach)) for s, reach in zip(seconds.tolist(), reaches, strict=True)]
+    def ways_m(self) -> FloatArray:
+        """(moments, n, 2) that they will have gone at each moment."""
+        return self.who.way_m(self.ahead_s * MOMENTS)
+
+    @cached_property
+    def reaches_s(self) -> FloatArray:
+        """(moments, 1, 1) by which velocities told reach."""
+        return reaches_s(self.ahead_s * MOMENTS)[:, None, None]
+
+    @cached_property
+    def _beyond_m(self) -> FloatArray:
+        """(moments, n, 2) by which they will be farther than who was told their velocity believes."""
+        return self.ways_m - self.told * self.reaches_s
 
     @cached_property
     def aims_m(self) -> FloatArray:
         """(n, 2) from where they are now to the place to tell."""
-        aims: FloatArray = np.mean([way - self.told * reach_s for way, reach_s in self.moments], axis=0)
+        aims: FloatArray = self._beyond_m.mean(axis=0)
         return aims
 
-    def left_m(self) -> Sequence[FloatArray]:
-        """At each moment (n, 2): how far off receivers would show them that were told now."""
-        return [way - self.told * reach_s - self.aims_m for way, reach_s in self.moments]
+    def left_m(self) -> FloatArray:
+        """(moments, n, 2): how far off receivers would show them that were told now."""
+        return self._beyond_m - self.aims_m

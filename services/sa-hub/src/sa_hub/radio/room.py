@@ -28,3 +28,7 @@ class Room:
     def interval_s(self, soldiers: int) -> float:
         """Time between two reports of a soldier, when so many share the budget."""
         return (self.frame_bits + _ENTRY_BITS * self.bits_per_bit * soldiers) / self.rate_bits_per_s
+
+    def report_bits(self, soldiers: int) -> float:
+        """What a report of one of so many takes on the air, with its share of the frame."""
+        return self.interval_s(soldiers) * self.rate_bits_per_s / soldiers

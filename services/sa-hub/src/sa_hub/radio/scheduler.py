@@ -19,12 +19,11 @@ from sa_hub.radio.content import Feedback, Report, Reports, Update
 from sa_hub.radio.grid import Grid
 from sa_hub.radio.ground import FloatArray
 from sa_hub.radio.history import History
-from sa_hub.radio.layout import MISSES
 from sa_hub.radio.listeners import LOSSLESS, Listeners
-from sa_hub.radio.offers import MOTION_BITS, RESOLUTIONS, Terms, Wares, best_offer, may_pay
+from sa_hub.radio.offers import MOTION_BITS, RESOLUTIONS, Terms, Wares, best_offer, frames_paid, least_misses
 from sa_hub.radio.outlook import Outlook
-from sa_hub.radio.pacing import Pacing, usual_level
-from sa_hub.radio.persistence import LONGEST_S, Persistence
+from sa_hub.radio.pacing import WALKERS, Pacing, usual_level
+from sa_hub.radio.persistence import STANDING_M_S, Persistence, Standard
 from sa_hub.radio.picture import BoolArray, Spoken
 from sa_hub.radio.references import resolved
 from sa_hub.radio.refreshing import Refreshing
@@ -32,7 +31,7 @@ from sa_hub.radio.relevance import Relevance
 from sa_hub.radio.room import Room
 from sa_hub.radio.telling import FRESH_NS, Telling
 from sa_hub.radio.wares import Candidates, candidates_of, samples_of
-from sa_hub.radio.worth import worth
+from sa_hub.radio.worth import CURVE, worth
 
 ENOUGH: Final = 0.12
 """Of the threshold: an error below it is worth no bits."""
@@ -41,22 +40,24 @@ COARSE_CELL: Final = 0.5
 CHEAP: Final = (math.exp(-4.0), math.exp(-5.0))
 """Prices of a bit below which cells are a half, and a quarter, of that."""
 CLOCK_SET_BACK_NS: Final = 60 * NS_PER_S
-STANDING_M_S: Final = 0.3
 _CHANGE_WORTH: Final = 3.0
 _TURN_WORTH: Final = 0.5
 _AGE_BITS: Final = 8.0
 _CHEAP_MISSES: Final = 3
 """Where bits are cheap, what is told is proof against surprises: more may be missed, all goes in full often."""
 _URGED_WORTH: Final = 50.0
-_UNSURE: Final = 5e-5
 SURE_MISSES: Final = 2
 """What updates allow for in any case where frames are lost: feedback is never of the last one."""
 LOSSY_SHARE: Final = 0.15
 """Of the price of an entry's bits where frames are lost: who is told in every frame is never long wrong, and his
 place, told against what is fresh, takes few bits. Counting only what is wrong now would leave him out."""
 PERIOD_NS: Final = 200_000_000
-"""Time between decisions."""
+LONG_PERIOD_NS: Final = 400_000_000
+"""Times between decisions, the longer one after nothing was near to being worth its bits."""
+_FAR_FROM_PAID: Final = 0.5
 _LONGEST_ELAPSED_S: Final = 10.0
+LONGEST_AHEAD_S: Final = 8.0
+"""Reports are judged by the time until the next one of those who walk, up to this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +87,7 @@ class Scheduler:
         self._refreshing = Refreshing()
         self._base_ns: int | None = None
         self._planned_ns: int | None = None
+        self._pause_ns = PERIOD_NS
         self._latest: Candidates | None = None
 
     # -- what was on the air ----------------------------------------------------------------------------------
@@ -182,7 +184,7 @@ class Scheduler:
 
     def is_due(self, now_ns: int) -> bool:
         """Whether it is time to decide again."""
-        return self._planned_ns is None or now_ns - self._planned_ns >= PERIOD_NS
+        return self._planned_ns is None or now_ns - self._planned_ns >= self._pause_ns
 
     def pass_time(self, room: Room, soldiers: int, now_ns: int) -> None:
         """It is decided now: the price of bits follows the budget and how many soldiers there are to tell of."""
@@ -211,7 +213,9 @@ class Scheduler:
         value, terms = self._worth(telling), self._terms(room)
         value += [urged * _URGED_WORTH * (number == self._own) for number in telling.who.numbers]
         refresh = self._refresh(telling, room)
-        if not may_pay(value.mean(axis=0) + refresh, terms):
+        paid = frames_paid(value.mean(axis=0) + refresh, terms)
+        self._pause_ns = LONG_PERIOD_NS if paid < _FAR_FROM_PAID else PERIOD_NS
+        if paid <= 1.0:
             return None
         offer = best_offer(self._wares(telling, value, refresh), terms)
         if (
@@ -273,17 +277,25 @@ class Scheduler:
         if self._base_ns is None:
             self._base_ns = now_ns
         slots, samples = self._slots_of(reports), samples_of(reports, self._base_ns)
-        self._persistence.see(slots, samples, min(room.interval_s(len(reports)), LONGEST_S))
-        shares = self._persistence.shares(slots)
-        who = candidates_of(reports, slots, samples, shares, (now_ns - self._base_ns) / NS_PER_S)
+        standard = self._standard(room, len(reports))
+        self._persistence.see(slots, samples, standard)
+        lasting, now_s = self._persistence.lasting(slots), (now_ns - self._base_ns) / NS_PER_S
+        who = candidates_of(reports, slots, samples, lasting, now_s)
         self._latest = who
-        velocity = who.velocity * shares[:, None]
+        velocity = who.velocity * self._persistence.shares(slots, standard)[:, None]
         velocity = np.where(np.hypot(*velocity.T)[:, None] < STANDING_M_S, 0.0, velocity)
         if self.listeners.loss >= LOSSLESS:
             velocity = self._history.as_told(slots, velocity)
         faces: BoolArray = (velocity == 0.0).all(axis=1) & self.is_cheap
-        outlook = Outlook(who, velocity, min(room.interval_s(len(reports)), LONGEST_S))
+        outlook = Outlook(who, velocity, standard.ahead_s)
         return Telling(outlook, faces, self._resolution(), now_ns, self._history, self._grid)
+
+    def _standard(self, room: Room, soldiers: int) -> Standard:
+        """What a report costs here, and the error at which it is worth that."""
+        bits = room.report_bits(soldiers)
+        near_m = ENOUGH * self._policy.threshold_m + (self._pacing.price * bits) ** (1.0 / CURVE)
+        usual_s = room.interval_s(max(1, round(WALKERS * soldiers)))
+        return Standard(near_m, min(usual_s, LONGEST_AHEAD_S), bits, MOTION_BITS * room.bits_per_bit)
 
     @property
     def is_cheap(self) -> bool:
@@ -331,7 +343,7 @@ class Scheduler:
 
     def _terms(self, room: Room) -> Terms:
         loss = self.listeners.loss
-        certain = (SURE_MISSES if loss >= LOSSLESS else 0) if self.listeners.all_tell else _least_misses(loss)
+        certain = (SURE_MISSES if loss >= LOSSLESS else 0) if self.listeners.all_tell else least_misses(loss)
         return Terms(
             price=self._pacing.price * room.bits_per_bit,
             frame_price=self._pacing.price * room.frame_bits,
@@ -340,10 +352,3 @@ class Scheduler:
             entry_share=1.0 if loss < LOSSLESS else LOSSY_SHARE,
             least_misses=max(certain, _CHEAP_MISSES) if self.is_cheap else certain,
         )
-
-
-def _least_misses(loss: float) -> int:
-    """What an update must allow for so that hardly anyone is left behind by chance."""
-    if loss < LOSSLESS:
-        return 0
-    return next((misses for misses in MISSES if loss ** (misses + 1) < _UNSURE), MISSES[-1])

@@ -2,26 +2,22 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from bootprint.clock import NS_PER_S
-from bootprint.prediction import reaches_s
 from sa_hub.radio.content import Report
 from sa_hub.radio.ground import METRES_PER_DEG, FloatArray, cosines, turn_deg
+from sa_hub.radio.persistence import reached_s
 from sa_hub.radio.picture import IntArray
-
-BRIEF_S: Final = 1.5
-"""Time constant of a velocity that does not last: of legs in a building."""
 
 
 @dataclass(frozen=True)
 class Candidates:
     """Who may be told: reports, their slots, and where they are ``now_s``; arrays are (n,), degrees and m/s.
 
-    ``samples`` (n, 5) are time, latitude, longitude and velocity as known; ``lasting`` (n, 2) is the part of the
-    velocity that will last.
+    ``samples`` (n, 5) are time, latitude, longitude and velocity as known; ``lasting`` (n, seconds) is the
+    share of the velocity that lasts so long, see `Persistence.lasting`.
     """
 
     reports: Sequence[Report]
@@ -32,14 +28,12 @@ class Candidates:
     now_s: float
     lasting: FloatArray
 
-    def way_m(self, seconds: float) -> FloatArray:
-        """(n, 2) m east and north that they are believed to go in the next seconds."""
+    def way_m(self, seconds: FloatArray) -> FloatArray:
+        """(k, n, 2) m east and north that they are believed to go in each of k times."""
         age_s = self.now_s - self.time_s
-        lasting_s = reaches_s(age_s + seconds) - reaches_s(age_s)
-        briefly_s = brief_s(age_s + seconds) - brief_s(age_s)
-        way: FloatArray = lasting_s[:, None] * self.lasting + briefly_s[:, None] * (
-            self.velocity - self.lasting
-        )
+        then_s = age_s + seconds[:, None]
+        reach_s = reached_s(self.lasting, then_s) - reached_s(self.lasting, age_s)
+        way: FloatArray = reach_s[:, :, None] * self.velocity
         return way
 
     @property
@@ -80,19 +74,11 @@ def samples_of(reports: Sequence[Report], base_ns: int) -> FloatArray:
 
 
 def candidates_of(
-    reports: Sequence[Report], slots: IntArray, samples: FloatArray, shares: FloatArray, now_s: float
+    reports: Sequence[Report], slots: IntArray, samples: FloatArray, lasting: FloatArray, now_s: float
 ) -> Candidates:
-    """The reports, moved on to now: the lasting ``shares`` of velocity by the rule, the rest briefly."""
+    """The reports, moved on to now by as much of their velocity as is ``lasting``."""
     time_s, latitude, longitude, east, north = samples.T
-    age_s = now_s - time_s
-    reach_s = shares * reaches_s(age_s) + (1.0 - shares) * brief_s(age_s)
+    reach_s = reached_s(lasting, now_s - time_s)
     latitude_now = np.clip(latitude + north * reach_s / METRES_PER_DEG, -90.0, 90.0)
     longitude_now = longitude + east * reach_s / (METRES_PER_DEG * cosines(latitude))
-    lasting = samples[:, 3:5] * shares[:, None]
     return Candidates(reports, slots, samples, latitude_now, turn_deg(longitude_now), now_s, lasting)
-
-
-def brief_s(elapsed_s: FloatArray) -> FloatArray:
-    """As `reaches_s`, for a velocity that does not last."""
-    brief: FloatArray = -BRIEF_S * np.expm1(-np.clip(elapsed_s, 0.0, None) / BRIEF_S)
-    return brief

@@ -20,15 +20,18 @@ def worth(outlook: Outlook, pictures: Pictures, enough_m: float, heartbeat_s: fl
     off_east, off_north = pictures.off_m(who.slots, who.latitude, who.longitude, who.now_s)
     shown_east, shown_north = pictures.velocity_m_s(who.slots, who.now_s)
     known = pictures.known[:, who.slots]
-    gains = []
-    for (way, reach_s), left in zip(outlook.moments, outlook.left_m(), strict=True):
-        east, north = (
-            off_east + way[:, 0] - shown_east * reach_s,
-            off_north + way[:, 1] - shown_north * reach_s,
+    east, north = (
+        off[None] + way[:, None] - shown[None] * outlook.reaches_s
+        for off, way, shown in (
+            (off_east, outlook.ways_m[:, :, 0], shown_east),
+            (off_north, outlook.ways_m[:, :, 1], shown_north),
         )
-        error_m = np.where(known, np.hypot(east, north), UNKNOWN_M)
-        gains.append(_cost(error_m, enough_m) - _cost(np.hypot(*left.T), enough_m))
-    gain: FloatArray = np.maximum(np.mean(gains, axis=0), 0.0)
+    )
+    error_m = np.where(known, np.hypot(east, north), UNKNOWN_M)
+    left = outlook.left_m()
+    left_m = np.hypot(left[:, None, :, 0], left[:, None, :, 1])
+    gains = _cost(error_m, enough_m) - _cost(left_m, enough_m)
+    gain: FloatArray = np.maximum(gains.mean(axis=0), 0.0)
     silence = np.maximum(who.time_s - pictures.time_s[:, who.slots], 0.0) / heartbeat_s
     return gain + np.where(known, SILENCE_WORTH * silence**2, 0.0)
 

@@ -7,6 +7,7 @@ matrices ``P0:`` and ``P1:`` (3x4, row by row; other lines are of no matter; two
 The run's frame is (z, −x, −y) of the poses: ahead, left, up.
 """
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,10 +50,16 @@ def read(folder: Path) -> list[Run]:
 def _images(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise RecordingError(f"{folder}: no such folder; a camera folder has {LEFT}/ and {RIGHT}/")
-    found = sorted(path for path in folder.iterdir() if path.suffix.lower() in _IMAGES)
+    found = sorted((path for path in folder.iterdir() if path.suffix.lower() in _IMAGES), key=_order)
     if len(found) < 2:
         raise RecordingError(f"{folder}: {len(found)} images; at least two are wanted ({', '.join(_IMAGES)})")
     return found
+
+
+def _order(path: Path) -> tuple[list[tuple[int, str]], str]:
+    """By name, in which numbers count as numbers: 9.png before 10.png."""
+    parts = re.split(r"(\d+)", path.stem)
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts], path.name
 
 
 def _text(path: Path) -> str:
@@ -67,8 +74,9 @@ def _text(path: Path) -> str:
 def projections(path: Path) -> tuple[FloatArray, FloatArray]:
     """The projection matrices (3, 4) of the left and the right eye in a calibration file; RecordingError."""
     lines = [line for line in _text(path).splitlines() if line.strip()]
-    named = {line.split()[0]: line.split()[1:] for line in lines}
-    if not any(line.split()[0].endswith(":") for line in lines) and len(lines) >= 2:
+    parted = [line.partition(":") for line in lines]
+    named = {f"{name.strip()}:": values.split() for name, colon, values in parted if colon}
+    if not named and len(lines) >= 2:
         named = {_LEFT_NAME: lines[0].split(), _RIGHT_NAME: lines[1].split()}
     return _matrix(path, named, _LEFT_NAME), _matrix(path, named, _RIGHT_NAME)
 

@@ -8,8 +8,8 @@ Student distribution, so that what moves by itself hardly pulls (Lange, Little a
 How far off sights are is a guess of good cameras. Where a shutter rolls, a lens distorts or the view is blurred
 all are off by more, and a gate for good ones would call the room a crowd: so the median of what is left scales all.
 
-A landmark's doubt is kept in the space of sights, where it is the same near and far. As a covariance of places it
-would be small where noise has put a point too near, and means weighted by it would shorten every motion.
+A landmark is a sight of the key frame, and so is its doubt: there errors are the same near and far. As places they
+would be skewed, and their covariance small where noise has put a point too near: it would shorten every motion.
 """
 
 from dataclasses import dataclass
@@ -32,6 +32,7 @@ _USUAL, _MOST_SCALE = (
 )  # median of chi-square by its numbers, two or three; and how bad sights may be
 _NEAREST_M = 0.05
 _LEAST_POINTS = 6
+_LEAST_OF_DISPARITY = 0.5  # that a shift may leave
 _KEPT_DOUBT, _BLIND_PX2 = 1.5, 1e8
 
 
@@ -142,19 +143,19 @@ def _refined(
 ) -> Pose | None:
     """Gauss–Newton over pose and landmarks from ``start``, each step weighing every landmark anew.
 
-    Landmarks are eliminated (Schur complement); their own best places are kept from step to step, for a model
+    Landmarks are eliminated (Schur complement); their own best sights are kept from step to step, for a model
     linearised at places with noise would take the motion for shorter than it is.
     """
     pose, shifts = start, np.zeros((len(landmarks), 3))
     for _ in range(_ROUNDS):
-        problem = _linearised(calibration, landmarks, sights, sigma_px, pose, shifts)
+        problem = linearised(calibration, landmarks, sights, sigma_px, pose, shifts)
         if problem is None:
             return None
         step: FloatArray = np.linalg.solve(problem.information, problem.gradient).astype(np.float64)
         pose, shifts = _moved(pose, step), problem.shifts(step)
         if float(np.abs(step).max()) < _SETTLED:
             break
-    problem = _linearised(calibration, landmarks, sights, sigma_px, pose, shifts)
+    problem = linearised(calibration, landmarks, sights, sigma_px, pose, shifts)
     if problem is None:
         return None
     agree = problem.squared < _GATE * problem.scale
@@ -166,10 +167,10 @@ def _refined(
 
 
 @dataclass(frozen=True, slots=True)
-class _Problem:
+class Problem:
     """Normal equations of the pose, (6, 6) and (6,), and by landmark (n): the residual (n, 3), squared in units of
-    its covariance, how many numbers it is of, its derivative by the pose, and the gain for the landmark's place.
-    ``scale``: of all covariances, by what is left of all."""
+    its covariance, how many numbers it is of, its derivative by the pose, its weight (n, 3, 3), and the gain for
+    the landmark's sight in the key frame. ``scale``: of all covariances, by what is left of all."""
 
     information: FloatArray
     gradient: FloatArray
@@ -177,36 +178,39 @@ class _Problem:
     squared: FloatArray
     numbers: FloatArray
     by_pose: FloatArray
+    weight: FloatArray
     gain: FloatArray
     scale: float
 
     def shifts(self, step: FloatArray) -> FloatArray:
-        """How far from where they were thought the landmarks are, (n, 3) m, once the pose has made a step."""
+        """What sights in the key frame lack, (n, 3) px, once the pose has made a step."""
         left = np.where(self.squared[:, None] < _GATE * self.scale, self.residual - self.by_pose @ step, 0.0)
         return np.asarray(np.einsum("nij,nj->ni", self.gain, left))
 
 
-def _linearised(
+def linearised(
     calibration: StereoCalibration,
     landmarks: Landmarks,
     sights: FloatArray,
     sigma_px: float,
     pose: Pose,
     shifts: FloatArray,
-) -> _Problem | None:
-    nearer = shifts[:, 2] < -0.5 * landmarks.points[:, 2]
-    shifts = np.where(nearer[:, None], 0.0, shifts)  # beyond what a linear model can tell
-    doubt = calibration.spread(landmarks.points + shifts, landmarks.covariances)
-    points = pose.points(landmarks.points + shifts)
+) -> Problem | None:
+    """The problem at a pose, sights in the key frame shifted by (n, 3) px; None where it has no one solution."""
+    known = calibration.sights(landmarks.points)
+    flat = calibration.disparity(known + shifts) < _LEAST_OF_DISPARITY * calibration.disparity(known)
+    shifts = np.where(flat[:, None], 0.0, shifts)  # beyond what a linear model can tell
+    places = calibration.points(known + shifts)
+    points = pose.points(places)
     ahead = points[:, 2] > _NEAREST_M
     points[~ahead] = (0.0, 0.0, 1.0)
     blind = ~np.isfinite(sights[:, 2])
     seen = calibration.sight_jacobian(points)
     seen[blind, 2] = 0.0
-    turned = seen @ pose.rotation.as_matrix()
+    turned = seen @ pose.rotation.as_matrix() @ calibration.point_jacobian(places)
     residual = np.where(np.isfinite(sights), sights - calibration.sights(points), 0.0)
     residual += np.einsum("nij,nj->ni", turned, shifts)
-    crossed = doubt @ np.swapaxes(turned, 1, 2)
+    crossed = landmarks.covariances @ np.swapaxes(turned, 1, 2)
     inverse = np.linalg.inv(turned @ crossed + sigma_px**2 * np.eye(3))
     squared = np.einsum("ni,nij,nj->n", residual, inverse, residual)
     numbers = np.where(blind, 2.0, 3.0)
@@ -214,14 +218,15 @@ def _linearised(
     scale = _scale(squared[near] / numbers[near])
     weight = np.where(ahead, (_STUDENT + 3.0) / (_STUDENT + squared / scale), 0.0)
     by_pose = np.concatenate([-seen @ _crosses(points), seen], axis=2)
-    whitened = np.swapaxes(by_pose, 1, 2) @ (weight[:, None, None] * inverse)
+    weights = weight[:, None, None] * inverse
+    whitened = np.swapaxes(by_pose, 1, 2) @ weights
     information = (whitened @ by_pose).sum(axis=0)
     if np.linalg.matrix_rank(information) < 6:
         return None
     gradient = np.einsum("nij,nj->i", whitened, residual)
     squared = np.where(ahead, squared, np.inf)
     gain = crossed @ inverse * ahead[:, None, None]
-    return _Problem(information, gradient, residual, squared, numbers, by_pose, gain, scale)
+    return Problem(information, gradient, residual, squared, numbers, by_pose, weights, gain, scale)
 
 
 def _scale(squared: FloatArray) -> float:

@@ -21,6 +21,7 @@ from sensor_gateway.stereo.recognition import recognised
 from sensor_gateway.stereo.right_eye import RightEye
 from sensor_gateway.stereo.settings import OdometrySettings
 from sensor_gateway.stereo.tracking import find_corners, follow, match_rows
+from sensor_gateway.stereo.turned_in import turned_in
 
 _NS_PER_S = 1e9
 # Camera axes (right, down, ahead) to body axes (forward, left, up).
@@ -31,6 +32,7 @@ _NEAR_CORNERS = 60
 _DEEP = 5  # levels of the pyramid: a corner is found again 100 px off
 _MOST_STEPS = 6  # ahead of the last pair with a motion: beyond, nobody goes on as they went
 _MOST_M_S2, _SLACK_M = 20.0, 0.05  # of a head or a car, over the time from pair to pair
+_MOST_STEPS_OFF = 1.2  # of the last step: a pair may be missing, and times may be guesses
 _FEW_MATCHED = 0.25  # of the corners: fewer, and the right eye may look elsewhere
 _SIGHTLESS: tuple[Condition, ...] = ("dark", "smoke")
 
@@ -169,6 +171,7 @@ class StereoOdometry:
         """Whether somebody can have been pushed so: a wall of alike tiles fits a tile further on as well."""
         seconds = (time_ns - self._pose_ns) / _NS_PER_S
         most_m = _SLACK_M + _MOST_M_S2 * seconds**2
+        most_m += _MOST_STEPS_OFF * float(np.linalg.norm(self._step.place))
         return self._step_ns <= 0 or float(np.linalg.norm(pose.place - onward.place)) <= most_m
 
     def _look(self, pair: _Pair, key: _KeyFrame, guess: Pose, levels: int) -> _Seen:
@@ -262,16 +265,13 @@ class StereoOdometry:
 
     def _move_key(self, pair: _Pair, key: _KeyFrame, pose: Pose, seen: _Seen) -> None:
         """The newest pair becomes the key frame; landmarks that agree come along."""
-        agree = pose.agree
-        landmarks = carried(
-            self._calibration,
-            key.landmarks.chosen(seen.index[agree]),
-            seen.sights[agree],
-            pose,
-            self._settings.sight_sigma_px,
-        )
-        landmarks = landmarks.chosen(self._is_placed(landmarks))
-        self._set_key(pair, landmarks)
+        agreeing, sights = key.landmarks.chosen(seen.index[pose.agree]), seen.sights[pose.agree]
+        sigma_px = self._settings.sight_sigma_px
+        landmarks = carried(self._calibration, agreeing, sights, pose, sigma_px)
+        turn = turned_in(self._calibration, agreeing, sights, pose, sigma_px)
+        if turn is not None and self._right_eye.learn_turn(*turn):
+            pair = self._pair(pair.time_ns, pair.left, pair.right_as_seen)
+        self._set_key(pair, landmarks.chosen(self._is_placed(landmarks)))
 
     def _is_placed(self, landmarks: Landmarks) -> npt.NDArray[np.bool_]:
         disparity = self._calibration.disparity(self._calibration.sights(landmarks.points))

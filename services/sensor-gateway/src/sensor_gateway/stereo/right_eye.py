@@ -10,7 +10,7 @@ lenses, rows in units of the focal length differ by
 x, y being the sight's (right) coordinates: so a Kalman filter learns all five from the matches of each key frame
 (Dang, Hoffmann and Stiller 2009 calibrate cars' cameras so). Then the right image is turned back by the homography
 ``K diag(1 + ε, 1 + ε, 1) Rᵀ K⁻¹`` before anything is matched in it. ω_y, which shifts all disparities alike and so
-scales the way, shows only in the corners, and is believed little.
+scales the way, shows in rows only at the corners; motions tell it (`stereo.turned_in`).
 """
 
 import cv2
@@ -29,6 +29,7 @@ _OUTLIER = 3.0  # sigmas from the median of what is left
 _FEWEST = 12
 _LEAST_PX = 0.15  # what is off by less is left as it is
 _WIDEST_ROWS = 6
+_TURNED_IN, _RADIAL = 1, 4  # ω_y and κ in the state
 
 
 class RightEye:
@@ -37,6 +38,7 @@ class RightEye:
     def __init__(self, calibration: StereoCalibration) -> None:
         self._calibration = calibration
         self._state: FloatArray = np.zeros(5)
+        self._taken_out: FloatArray = np.zeros(5)  # of images, so far: of what is left alone they still tell
         self._prior: FloatArray | None = None  # needs the image's size
         self._covariance: FloatArray = np.zeros((5, 5))
         self._corners: FloatArray = np.zeros((0, 2))
@@ -45,7 +47,7 @@ class RightEye:
         """The image as an eye would have seen it that is as calibrated."""
         if self._prior is None:
             self._begin(image)
-        if not np.abs(self._moved_px()).max() >= _LEAST_PX:
+        if not self._taken_out.any():
             return image
         height, width = image.shape
         return np.asarray(
@@ -68,13 +70,13 @@ class RightEye:
         return min(_WIDEST_ROWS, max(1, round(off)))
 
     def learn(self, left: FloatArray, right: FloatArray) -> bool:
-        """Matches (n, 2) px of the left and the straightened right image; whether that changes what is seen."""
+        """Matches (n, 2) px of the left and the straightened right image; whether images are to be turned anew."""
         if len(left) < _FEWEST:
             return False
-        before = self._moved_px()
         self._covariance = self._covariance + _WANDER**2 * self._prior_covariance()
         design = self._rows(self._normal(left), self._normal(right, self._calibration.right_centre_x_px))
         off = (right[:, 1] - left[:, 1]) / self._calibration.focal_y_px
+        off -= design @ (self._state - self._taken_out)  # what is known of it already
         sigma = _ROW_SIGMA_PX / self._calibration.focal_y_px
         kept = np.ones(len(off), dtype=bool)
         for _ in range(3):
@@ -83,7 +85,26 @@ class RightEye:
             spread = max(sigma, 1.4826 * float(np.median(np.abs(rest - np.median(rest)))))
             kept = np.abs(rest - np.median(rest)) < _OUTLIER * spread
         self._state, self._covariance = self._state + change, covariance
-        return bool(np.abs(self._moved_px() - before).max() > _LEAST_PX)
+        return self._take_out()
+
+    def learn_turn(self, turn_rad: float, variance: float) -> bool:
+        """ω_y of the straightened images, as a motion shows it; whether images are to be turned anew."""
+        innovation = turn_rad - float((self._state - self._taken_out)[_TURNED_IN])
+        gain = self._covariance[:, _TURNED_IN] / (
+            self._covariance[_TURNED_IN, _TURNED_IN] + _REPEATS * variance
+        )
+        self._state = self._state + gain * innovation
+        self._covariance = self._covariance - np.outer(gain, self._covariance[_TURNED_IN])
+        return self._take_out()
+
+    def _take_out(self) -> bool:
+        """From now on images are turned by what is known now, if that is another turn than before."""
+        known = self._state.copy()
+        known[_RADIAL] = 0.0  # no homography takes that out
+        if not np.abs(self._moved_px(known) - self._moved_px(self._taken_out)).max() > _LEAST_PX:
+            return False
+        self._taken_out = known
+        return True
 
     def forget(self) -> None:
         """Nothing fits any more: the eye may have been knocked."""
@@ -122,10 +143,10 @@ class RightEye:
         x, y = right[:, 0], right[:, 1]
         return np.column_stack([1.0 + y**2, -x * y, -x, y, y * (x**2 - left[:, 0] ** 2)])
 
-    def _moved_px(self) -> FloatArray:
+    def _moved_px(self, state: FloatArray) -> FloatArray:
         """By how much (k, 2) the image's corners and edges are off."""
         x, y = self._corners[:, 0], self._corners[:, 1]
-        turn_x, turn_y, turn_z, longer, _ = self._state
+        turn_x, turn_y, turn_z, longer, _ = state
         across = -turn_y * (1.0 + x**2) + turn_z * y + turn_x * x * y + longer * x
         down = turn_x * (1.0 + y**2) - turn_y * x * y - turn_z * x + longer * y
         return self._calibration.focal_y_px * np.column_stack([across, down])
@@ -134,7 +155,7 @@ class RightEye:
         """From pixels as they should be to those as they are, (3, 3)."""
         matrix = self._calibration.matrix
         matrix[0, 2] = self._calibration.right_centre_x_px
-        longer = 1.0 + self._state[3]
-        turned = Rotation.from_rotvec(self._state[:3]).as_matrix().T
+        longer = 1.0 + self._taken_out[3]
+        turned = Rotation.from_rotvec(self._taken_out[:3]).as_matrix().T
         result: FloatArray = matrix @ np.diag([longer, longer, 1.0]) @ turned @ np.linalg.inv(matrix)
         return result

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from bootprint.geomagnetism import EarthField
 from bootprint.messages import Float64Array
 from pdr_engine.body.azimuth.compass import Compass, Reading
-from pdr_engine.body.azimuth.heading import GyroAlone, Heading
+from pdr_engine.body.azimuth.heading import GyroAlone, Heading, wrapped
 from pdr_engine.body.azimuth.online_calibration import OnlineCalibration
 from pdr_engine.body.azimuth.repeated import Repeated
-from pdr_engine.body.azimuth.sources import source_of
+from pdr_engine.body.azimuth.sources import Headings
 from pdr_engine.body.settings import BodySettings
 from pdr_engine.body.steps.attitude import Rows
 from pdr_engine.body.steps.strides import Cut
@@ -19,11 +19,20 @@ _UNSEEN_TURN_RAD = 1.0  # what a person may turn in a gap
 
 @dataclass(frozen=True, slots=True)
 class Bearing:
-    """Of the unit's reference axis, amid a step; ``reading`` None without a magnetometer."""
+    """Of the unit's reference axis, amid a step; ``reading`` None without a magnetometer.
 
+    ``track``: for adding steps up; ``heading``: from north, as it is known now (`Headings`).
+    """
+
+    track: Heading
     heading: Heading
     gyro: Heading
     reading: Reading | None
+
+    @property
+    def turn_rad(self) -> float:
+        """By how much the track's frame is to be turned clockwise for north to be at its top."""
+        return wrapped(self.heading.azimuth_rad - self.track.azimuth_rad)
 
     @property
     def disturbed(self) -> bool:
@@ -37,11 +46,11 @@ class Bearings:
     def __init__(self, settings: BodySettings) -> None:
         self.compass = Compass(settings)
         self._method = (settings.azimuth, settings.heading)
-        self._source = source_of(*self._method)
+        self._source = Headings(*self._method)
         self._gyro = GyroAlone(settings.heading)
         self.repeated = Repeated(settings.deviations) if settings.deviation_map else None
         self._online = OnlineCalibration(settings.heading) if settings.online_calibration else None
-        self._heading: Heading | None = None
+        self._track: Heading | None = None  # what is expected of the compass: the slower of both
         self._rest_turn_rad_s = 0.0
         self._last: tuple[int, float] | None = None  # end and mean yaw of the last step
 
@@ -66,11 +75,11 @@ class Bearings:
         reading = raw = self._read(field_ut, turn_rad, since_s)
         if self.repeated is not None and raw is not None:
             reading = self.repeated.corrected(raw)
-        self._heading = self._source.step(turn_rad, since_s, reading)
-        self._calibrate(cut, since_s, raw)
+        self._track, heading = self._source.step(turn_rad, since_s, reading)
+        heading = self._calibrate(cut, since_s, raw) or heading
         if self.repeated is not None and raw is not None:
-            self.repeated.learn(raw, self._heading)
-        return Bearing(self._heading, self._gyro.step(turn_rad, since_s, reading), reading)
+            self.repeated.learn(raw, heading)
+        return Bearing(self._track, heading, self._gyro.step(turn_rad, since_s, reading), reading)
 
     def lose(self) -> None:
         """The stream broke: nobody knows how far the unit turned."""
@@ -84,19 +93,24 @@ class Bearings:
         if self._online is not None:
             self._online.iron.unbias(rate_rad_s)
 
-    def _calibrate(self, cut: Cut, step_s: float, reading: Reading | None) -> None:
-        """Learn the iron that is worn; when it is found, azimuth and drift that rested on it begin anew."""
+    def _calibrate(self, cut: Cut, step_s: float, reading: Reading | None) -> Heading | None:
+        """Learn the iron that is worn; when it is found, azimuth and drift that rested on it begin anew.
+
+        The azimuth from north then, else None.
+        """
         if self._online is None:
-            return
+            return None
         found = self._online.learn(cut, step_s, reading is not None and not reading.disturbed)
-        if found is not None:
-            self._source = source_of(*self._method)
-            self._heading = self._source.step(0.0, 0.0, Reading(*found))
+        if found is None:
+            return None
+        self._source = Headings(*self._method)
+        self._track, heading = self._source.step(0.0, 0.0, Reading(*found))
+        return heading
 
     def _read(self, field_ut: Float64Array | None, turn_rad: float, since_s: float) -> Reading | None:
         if field_ut is None:
             return None
         carried = None
-        if self._heading is not None:
-            carried = ((self._heading.azimuth_rad - turn_rad) % math.tau, self._heading.sigma_rad)
+        if self._track is not None:
+            carried = ((self._track.azimuth_rad - turn_rad) % math.tau, self._track.sigma_rad)
         return self.compass.read(field_ut, -turn_rad, since_s, carried)

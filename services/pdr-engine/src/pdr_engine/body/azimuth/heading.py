@@ -96,12 +96,13 @@ class Combined:
     """Gyro first, compass where the field is trusted (METHODS B8): a Kalman filter of azimuth and gyro drift.
 
     The errors of a compass are alike over some metres, so each of n steps that share an error is given n times its
-    variance (`Reading.lasting_variance`). An innovation beyond three sigmas inflates the reading's variance until
-    it is three.
+    variance. An innovation beyond three sigmas inflates the reading's variance until it is three. Where the field
+    is bent it can either keep a track's shape (`Reading.lasting_variance`) or be ``prompt`` in finding north
+    (`Reading.alike_variance`, and a first reading that is hardly believed): nothing is both.
     """
 
-    def __init__(self, settings: HeadingSettings) -> None:
-        self._settings = settings
+    def __init__(self, settings: HeadingSettings, prompt: bool = False) -> None:
+        self._settings, self._prompt = settings, prompt
         self._azimuth_rad: float | None = None
         self._drift_rad_s = 0.0
         self._p = [UNKNOWN_RAD**2, 0.0, settings.gyro_drift_rad_s**2]  # aa, ad, dd
@@ -110,7 +111,7 @@ class Combined:
         """See `Source`."""
         if self._azimuth_rad is None:
             self._azimuth_rad = reading.azimuth_rad if reading else 0.0
-            self._p[0] = reading.sigma_rad**2 if reading else UNKNOWN_RAD**2
+            self._p[0] = self._first_sigma_rad(reading) ** 2
         else:
             self._predict(turn_rad, step_s)
             if reading is not None and reading.trusted:
@@ -124,6 +125,11 @@ class Combined:
     def unbias(self, rate_rad_s: float) -> None:
         """See `Source`."""
         self._drift_rad_s -= rate_rad_s
+
+    def _first_sigma_rad(self, reading: Reading | None) -> float:
+        if reading is None:
+            return UNKNOWN_RAD
+        return max(reading.sigma_rad, self._settings.first_sigma_rad) if self._prompt else reading.sigma_rad
 
     def _predict(self, turn_rad: float, step_s: float) -> None:
         assert self._azimuth_rad is not None
@@ -140,7 +146,7 @@ class Combined:
         assert self._azimuth_rad is not None
         aa, ad, dd = self._p
         innovation = wrapped(reading.azimuth_rad - self._azimuth_rad)
-        variance = reading.lasting_variance
+        variance = reading.alike_variance if self._prompt else reading.lasting_variance
         total = max(aa + variance, (innovation / _GATE) ** 2)
         gain_a, gain_d = aa / total, ad / total
         self._azimuth_rad += gain_a * innovation

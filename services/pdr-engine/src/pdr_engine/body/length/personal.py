@@ -4,7 +4,8 @@ Between two good fixes far enough apart the steps should lead as far as the fixe
 no heading has to be known. The logarithm of the factor is a scalar Kalman state; it starts with what the walks of
 different people scatter by, and is held within bounds whatever the fixes say. With the neural network the factor
 goes by gait: its logarithm is linear in the hidden layer's outputs, so the same fixes refine the output weights on
-line, by a Kalman filter instead of gradient steps, and no walk can make them run away.
+line, by a Kalman filter instead of gradient steps, and no walk can make them run away. What walking has shown says
+nothing of the models of other movements: runs have a factor of their own, and so has all the rest.
 """
 
 import math
@@ -14,10 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bootprint.messages import Float64Array
+from bootprint.messages import Float64Array, MotionClass
 
 PRIOR_SIGMA = 0.055
 GAIT_SIGMA = 0.03  # of what a person's factor depends on the gait by, for each output of the hidden layer
+OTHER_SIGMA = 0.12  # of the models of runs, and of what is neither walked nor run
 MODEL_SIGMA = 0.02  # how far one stretch's factor is from the person's
 MOST_LOG = math.log(1.25)
 WALK_PER_STRETCH = 0.003  # shoes, load and tiredness change it
@@ -25,6 +27,7 @@ LEAST_DISTANCE_M = 50.0
 WORST_ACCURACY_M = 5.0
 LONGEST_STRETCH_S = 180.0
 _GATE = 3.0
+_RUN, _REST = -2, -1  # weights of what is not walked, behind the walker's
 _NS = 1e-9
 
 
@@ -57,9 +60,11 @@ class PersonalScale:
     def __init__(
         self, factor: float = 1.0, sigma: float = PRIOR_SIGMA, refinement: Sequence[float] = ()
     ) -> None:
-        self._weights = np.array([math.log(factor), *refinement])
-        self._variance = np.diag([sigma**2, *(GAIT_SIGMA**2 for _ in refinement)])
-        self._features = np.array([1.0, *(0.0 for _ in refinement)])
+        self._weights = np.array([math.log(factor), *refinement, 0.0, 0.0])
+        refined = [GAIT_SIGMA] * len(refinement)
+        self._variance = np.diag(np.square([sigma, *refined, OTHER_SIGMA, OTHER_SIGMA]))
+        self._features = np.zeros(len(self._weights))
+        self.meet([0.0] * len(refinement))
         self._walked = np.zeros(2)
         self._leaning = np.zeros((2, len(self._weights)))
         self._anchor: _Anchor | None = None
@@ -78,12 +83,16 @@ class PersonalScale:
     @property
     def person(self) -> Person:
         """To be begun with the next time."""
-        log, *refinement = self._weights.tolist()
+        log, *refinement = self._weights[:_RUN].tolist()
         return Person(math.exp(log), math.sqrt(float(self._variance[0, 0])), tuple(refinement))
 
-    def meet(self, features: Sequence[float]) -> None:
-        """The next step's features, as many as there are refined weights."""
-        self._features[1:] = features
+    def meet(self, features: Sequence[float], motion: MotionClass = "walking") -> None:
+        """The next step's features, as many as there are refined weights; they count for walking."""
+        self._features[:] = 0.0
+        if motion == "walking":
+            self._features[:_RUN] = (1.0, *features)
+        else:
+            self._features[_RUN if motion == "running" else _REST] = 1.0
 
     def walk(self, length_m: float, azimuth_rad: float) -> None:
         """Another step, with the factor in it."""

@@ -1,9 +1,10 @@
 """Whether satellite fixes are as good as they say: their track against the one that was walked.
 
-A receiver that states 5 m and errs by 20 m draws another picture than the steps did. Whatever direction and place
-the steps are off by is taken out by a rigid fit over the last minute or two; what is left, against what the fixes
-state, tells by how much they understate. Errors of fixes last, so a fit swallows part of them, and an honest
-receiver that is not quite so good as it says is not suspected.
+A receiver that states 5 m and errs by 20 m draws another picture than the steps did. Whatever direction, place and
+length the steps are off by is taken out by a fit over the last minute or two (lengths within what people's steps
+are misjudged by: those are what fixes are to teach); what is left, against what the fixes state, tells by how much
+they understate. Errors of fixes last, so a fit swallows part of them, and an honest receiver that is not quite so
+good as it says is not suspected.
 """
 
 import math
@@ -13,10 +14,11 @@ from typing import NamedTuple
 SPACING_NS = 2_000_000_000
 _KEPT = 45  # fixes
 _LEAST_FIXES = 6
-_FITTED = 3.0  # parameters of the rigid fit
+_FITTED = 4.0  # parameters of the fit
+_MOST_STRETCH = 1.3  # of the walked track, or its inverse
 _SUSPECT = 1.5  # times what is stated
 _LEAST_ACCURACY_M = 1.0
-_STEPS_SHARE = 0.05  # by which the walked track may be too long
+_STEPS_SHARE = 0.05  # by which parts of the walked track may be longer than others
 
 
 class _Fix(NamedTuple):
@@ -54,15 +56,22 @@ class Honesty:
         return ratio if ratio > _SUSPECT else 1.0
 
     def _misfit(self) -> float:
-        """The sum of squares, in sigmas, that a rigid fit of the walked places to the fixes leaves."""
+        """The sum of squares, in sigmas, that a fit of the walked places to the fixes leaves."""
         weights = [fix.sigma_m**-2 for fix in self._fixes]
         total = sum(weights)
         fixed = sum(w * fix.fixed_m for w, fix in zip(weights, self._fixes, strict=True)) / total
         walked = sum(w * fix.walked_m for w, fix in zip(weights, self._fixes, strict=True)) / total
         apart = [(fix.fixed_m - fixed, fix.walked_m - walked) for fix in self._fixes]
         turned = sum(w * a * b.conjugate() for w, (a, b) in zip(weights, apart, strict=True))
-        turn = turned / abs(turned) if turned else 1.0 + 0j
+        extent = sum(w * abs(b) ** 2 for w, (_, b) in zip(weights, apart, strict=True))
+        turn = _bounded(turned / extent) if turned else 1.0 + 0j
         return sum(
             abs(a - turn * b) ** 2 / (w**-1 + (_STEPS_SHARE * abs(b)) ** 2)
             for w, (a, b) in zip(weights, apart, strict=True)
         )
+
+
+def _bounded(factor: complex) -> complex:
+    """Turn and stretch, the latter as far as steps may be misjudged."""
+    stretch = min(max(abs(factor), 1.0 / _MOST_STRETCH), _MOST_STRETCH)
+    return factor / abs(factor) * stretch
