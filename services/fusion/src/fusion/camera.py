@@ -119,6 +119,7 @@ class Camera:
 
     def shift(self, by_ns: int) -> None:
         """The clock has been set: the chain starts anew, the place is kept."""
+        self._along.clear()
         self._begin()
         if self.foot is not None and not self.is_reference:
             self._leave(self.foot)

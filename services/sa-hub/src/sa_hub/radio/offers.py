@@ -83,7 +83,7 @@ class Wares:
 
 @dataclass(frozen=True)
 class Terms:
-    """What bits cost: ``price`` per bit in the frame, ``frame_price`` of sending one (not 0); room for so many.
+    """What bits cost: ``price`` per bit in the frame, ``frame_price`` of sending one at all, and room for how many.
 
     ``delivered`` is the share of frames that are heard, ``least_misses`` what an update must allow for,
     ``entry_share``: an entry pays so much of its bits' price.
@@ -124,10 +124,10 @@ class Offer:
         return list(zip(self.far[picked].tolist(), self.steady[picked].tolist(), strict=True))
 
 
-def frames_paid(gain: FloatArray, terms: Terms) -> float:
-    """How many frames' price telling could pay at most: a quick look, since most of the time it is none."""
+def most_surplus(gain: FloatArray, terms: Terms) -> float:
+    """What could at most be left for a frame's price: a quick look, since most of the time it is too little."""
     least_price = terms.entry_share * terms.price * LEAST_ENTRY_BITS
-    return float(np.maximum(gain - least_price, 0.0).sum()) / terms.frame_price
+    return float(np.maximum(gain - least_price, 0.0).sum())
 
 
 def best_offer(wares: Wares, terms: Terms) -> Offer | None:

@@ -20,7 +20,7 @@ from sa_hub.radio.grid import Grid
 from sa_hub.radio.ground import FloatArray
 from sa_hub.radio.history import History
 from sa_hub.radio.listeners import LOSSLESS, Listeners
-from sa_hub.radio.offers import MOTION_BITS, RESOLUTIONS, Terms, Wares, best_offer, frames_paid, least_misses
+from sa_hub.radio.offers import MOTION_BITS, RESOLUTIONS, Terms, Wares, best_offer, least_misses, most_surplus
 from sa_hub.radio.outlook import Outlook
 from sa_hub.radio.pacing import WALKERS, Pacing, usual_level
 from sa_hub.radio.persistence import STANDING_M_S, Persistence, Standard
@@ -87,7 +87,7 @@ class Scheduler:
         self._refreshing = Refreshing()
         self._base_ns: int | None = None
         self._planned_ns: int | None = None
-        self._pause_ns = PERIOD_NS
+        self._pause_ns: int | None = None
         self._latest: Candidates | None = None
 
     # -- what was on the air ----------------------------------------------------------------------------------
@@ -184,14 +184,14 @@ class Scheduler:
 
     def is_due(self, now_ns: int) -> bool:
         """Whether it is time to decide again."""
-        return self._planned_ns is None or now_ns - self._planned_ns >= self._pause_ns
+        return self._planned_ns is None or now_ns - self._planned_ns >= (self._pause_ns or PERIOD_NS)
 
     def pass_time(self, room: Room, soldiers: int, now_ns: int) -> None:
         """It is decided now: the price of bits follows the budget and how many soldiers there are to tell of."""
         elapsed_s = _LONGEST_ELAPSED_S
         if self._planned_ns is not None:
             elapsed_s = min((now_ns - self._planned_ns) / NS_PER_S, _LONGEST_ELAPSED_S)
-        self._planned_ns = now_ns
+        self._planned_ns, self._pause_ns = now_ns, None
         self.listeners.pass_time(now_ns)
         usual = usual_level(room, soldiers, ENOUGH * self._policy.threshold_m)
         self._pacing.passed(elapsed_s, room.free_bits / room.depth_bits, usual)
@@ -213,9 +213,10 @@ class Scheduler:
         value, terms = self._worth(telling), self._terms(room)
         value += [urged * _URGED_WORTH * (number == self._own) for number in telling.who.numbers]
         refresh = self._refresh(telling, room)
-        paid = frames_paid(value.mean(axis=0) + refresh, terms)
-        self._pause_ns = LONG_PERIOD_NS if paid < _FAR_FROM_PAID else PERIOD_NS
-        if paid <= 1.0:
+        surplus = most_surplus(value.mean(axis=0) + refresh, terms)
+        if self._pause_ns is None:  # by the first look: after a frame nothing is worth another, for a moment
+            self._pause_ns = LONG_PERIOD_NS if surplus < _FAR_FROM_PAID * terms.frame_price else PERIOD_NS
+        if surplus <= terms.frame_price:
             return None
         offer = best_offer(self._wares(telling, value, refresh), terms)
         if (
