@@ -55,13 +55,13 @@ golden: $(READY) ## write the golden outputs anew (ARGS=--walk: the small record
 figures: $(READY) $(PAGE) ## make anew the figures and generated pages of the documents
 	$(BIN)/bootprint topics > docs/topics.md
 	$(BIN)/python -m proving_ground.scenario.keys_page docs/scenarios.md
-	$(BIN)/python -m proving_ground.evaluation.figures $(or $(BOOTPRINT_DATA),../shared/data) docs
-	$(BIN)/python -m proving_ground.evaluation.body_page $(or $(BOOTPRINT_DATA),../shared/data) docs
-	$(BIN)/python -m proving_ground.evaluation.fusion_page docs
-	$(BIN)/python -m proving_ground.evaluation.fusion_feet_page $(or $(BOOTPRINT_DATA),../shared/data) docs
-	$(BIN)/python -m proving_ground.evaluation.camera_page docs
-	$(BIN)/python -m proving_ground.exercises.reliability_page docs
-	$(BIN)/python -m proving_ground.evaluation.room_page docs
+	$(BIN)/python -m proving_ground.evaluation.foot.figures $(or $(BOOTPRINT_DATA),../shared/data) docs
+	$(BIN)/python -m proving_ground.evaluation.body.page $(or $(BOOTPRINT_DATA),../shared/data) docs
+	$(BIN)/python -m proving_ground.evaluation.fusion.page docs
+	$(BIN)/python -m proving_ground.evaluation.fusion.feet_page $(or $(BOOTPRINT_DATA),../shared/data) docs
+	$(BIN)/python -m proving_ground.evaluation.camera.page docs
+	$(BIN)/python -m proving_ground.exercises.faults.reliability_page docs
+	$(BIN)/python -m proving_ground.evaluation.fusion.rooms_page docs
 	$(BIN)/python -m proving_ground.agreement.report $(or $(BOOTPRINT_DATA),../shared/data) docs
 	$(BIN)/python -m proving_ground.radio_load.figures $(or $(BOOTPRINT_DATA),../shared/data) docs
 	PYTHONPATH=tests $(BIN)/python -m support.page_pictures docs/img
@@ -83,8 +83,8 @@ bench: $(READY) ## docs/performance.md: what all costs with 1, 8 and 40 soldiers
 	$(BIN)/bootprint benchmark all --docs docs $(ARGS)
 
 storm: $(READY) ## an hour of faults of every kind at random (ARGS='--minutes 4' for less, --resume: go on), then docs/reliability.md
-	$(BIN)/python -m proving_ground.exercises.storms out/storms $(ARGS); ended=$$?; \
-	  $(BIN)/python -m proving_ground.exercises.reliability_page docs out/storms/*/result.json && exit $$ended
+	$(BIN)/python -m proving_ground.exercises.faults.storms out/storms $(ARGS); ended=$$?; \
+	  $(BIN)/python -m proving_ground.exercises.faults.reliability_page docs out/storms/*/result.json && exit $$ended
 
 compose-test: ## build the images, run docker-compose.yml for real (needs a Docker engine)
 	deploy/compose-test

@@ -141,6 +141,50 @@ def test_satellites_teach_a_belt_alone_how_it_sits(turned_rad: float, length: fl
     assert away_m(end, walk) < 2.5 * sigma_m(end)
 
 
+def taught(steps: list[Envelope], from_s: float, turned_rad: float, scale: float) -> list[Envelope]:
+    """The same steps, told by a pdr-engine that satellites have taught so much from then on."""
+    out = []
+    for item in steps:
+        step = item.message
+        assert isinstance(step, BodyStep)
+        if step.time_ns - T0 > from_s * NS:
+            step = msgspec.structs.replace(
+                step,
+                length_m=scale * step.length_m,
+                azimuth_rad=step.azimuth_rad + turned_rad,
+                taught_scale=scale,
+                taught_turn_rad=turned_rad,
+            )
+        out.append(envelope("body_step", "body", step))
+    return out
+
+
+@pytest.mark.parametrize("taught_from_s", [0.0, 60.0])
+def test_what_pdr_engine_has_been_taught_is_not_mended_twice(taught_from_s: float) -> None:
+    """It learns from the same satellites, before or amid fusion's own lessons; no error is mended twice."""
+    walk = SimulatedWalk(straight(0.0), 200.0)
+    own = body_steps(walk, turned_rad=0.3, length=0.8)
+    untaught, told = (
+        run(steps, doppler(120))[-1] for steps in (own, taught(own, taught_from_s, -0.3, 1.0 / 0.8))
+    )
+    assert told.mode == untaught.mode == "body"
+    assert away_m(told, walk) < away_m(untaught, walk) + 0.5
+
+
+def test_what_walking_has_shown_does_not_stretch_a_run() -> None:
+    walk = SimulatedWalk(straight(0.0), 200.0)
+    steps = body_steps(walk, length=0.8)
+    run_steps = [
+        envelope("body_step", "body", msgspec.structs.replace(item.message, motion="running"))
+        for item in steps
+        if item.message.time_ns - T0 > 140 * NS
+    ]
+    walked = [item for item in steps if item.message.time_ns - T0 <= 140 * NS]
+    out = run([*walked, *run_steps], doppler(120))
+    begin, end = (next(p for p in out if p.time_ns - T0 > at * NS) for at in (142, 198))
+    assert end.east_m - begin.east_m == pytest.approx(0.8 * 1.4 * 56.0, rel=0.03)
+
+
 def test_a_foot_that_tells_late_of_a_silence_is_not_counted_beside_the_body() -> None:
     """One boot without poses, whose steps come three seconds late: the body stands in, and steps back."""
     walk = SimulatedWalk(straight(0.0), 60.0, poses=False)

@@ -17,9 +17,9 @@ from fusion.config import FusionConfig, TrustConfig
 from fusion.engine import FusionCore
 from fusion.trust import Receiver
 from pdr_engine.config import PdrConfig
-from proving_ground.evaluation.dual_walks import ORIGIN as WALKS_ORIGIN
-from proving_ground.evaluation.dual_walks import UNIT, dual_walk
-from proving_ground.evaluation.spoofing import Trial, play
+from proving_ground.evaluation.fusion.dual_walks import ORIGIN as WALKS_ORIGIN
+from proving_ground.evaluation.fusion.dual_walks import UNIT, dual_walk
+from proving_ground.evaluation.fusion.spoofing import Trial, play
 from proving_ground.inprocess import play_run, positions_of
 from support.foot_walks import (
     EAST,

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from pdr_engine.body.altitude.altimeter import LAG_S, Altimeter, pressure_height_m
+from pdr_engine.body.altitude.climb import Belief, Way
 from pdr_engine.body.altitude.floors import FloorCounter
+from pdr_engine.body.altitude.height_filter import HeightFilter
 from pdr_engine.body.altitude.vertical import VerticalChannel
 
 PA_PER_M = 12.0  # near the ground; the standard atmosphere has 12.01 at sea level
@@ -216,3 +218,57 @@ def test_later_pressure_tells_the_first_steps_of_stairs() -> None:
     assert altimeter.climb_at(round(10.0 * S)) is None  # settled long ago
     assert altimeter.climb_at(round(30.0 * S)) is None  # not yet
     assert Altimeter().climb_at(0) is None
+
+
+def climb_stairs(
+    kalman: HeightFilter, risers: float, ticks: int, start_m: float, riser_m: float, drift_m: float
+) -> float:
+    """Ten seconds on the level, then stairs, then a while on the level; the height by pressure at the end."""
+    level: tuple[Way, float] = ("level", 0.0)
+    pressure_m = start_m
+    step: tuple[Way, float] = ("stairs", 1.0 / ticks)
+    for way, share in [*[level] * 20, *[step] * ticks, *[level] * 20]:
+        pressure_m += share * (risers * riser_m + drift_m)
+        kalman.predict(way, share * risers, 0.0)
+        kalman.pressure(pressure_m, 0.1)
+        kalman.follow_climb(way)
+    return pressure_m
+
+
+def test_a_climb_made_again_takes_back_the_weather() -> None:
+    """40 risers of 16 cm up in still air, and down while the weather makes them 0.6 m more."""
+    kalman = HeightFilter(0.0, storey_m=3.6, storey_sigma_m=0.9)
+    top_m = climb_stairs(kalman, 40.0, 40, 0.0, 0.16, 0.0)
+    up_m = kalman.height_m
+    assert up_m == pytest.approx(6.4, abs=0.15)
+    climb_stairs(kalman, -40.0, 40, top_m, 0.16, -0.6)
+    assert abs(kalman.height_m) < 0.15
+    assert len(kalman.climbs_m) == 2  # that of the storey, and this one
+    alone = HeightFilter(top_m, storey_m=3.6, storey_sigma_m=0.9)
+    climb_stairs(alone, -40.0, 40, top_m, 0.16, -0.6)
+    assert abs(alone.height_m + 6.4) > 0.3  # who has not climbed it before believes half of it
+
+
+def test_another_climb_is_none_that_was_made_before() -> None:
+    kalman = HeightFilter(0.0, storey_m=3.6, storey_sigma_m=0.9)
+    pressure_m = climb_stairs(kalman, 40.0, 40, 0.0, 0.16, 0.0)
+    climb_stairs(kalman, 60.0, 60, pressure_m, 0.16, 0.0)
+    assert kalman.height_m == pytest.approx(16.0, abs=0.3)
+    np.testing.assert_allclose(kalman.climbs_m[1:], [6.4, 9.6], atol=0.25)
+
+
+def test_a_storey_that_is_told_measures_stairs() -> None:
+    """7.0 m by risers and pressure, 7.8 told to 5 cm: the weather has taken 0.8 m."""
+    told = HeightFilter(0.0, storey_m=7.8, storey_sigma_m=0.05)
+    climb_stairs(told, 48.0, 48, 0.0, 0.1625, -0.8)
+    assert told.height_m == pytest.approx(7.8, abs=0.15)
+
+
+def test_few_of_an_edge_s_steps_are_risers() -> None:
+    """A flight's steps are risers, those of its ends and landings a quarter, those on the level none."""
+    level, flight, edge = 0, 3, 4  # of the models of `climb`
+    shares = np.zeros(10)
+    shares[[level, flight, edge]] = 0.2, 0.6, 0.2
+    mean, variance = Belief(shares, shares, shares).risers_a_step
+    assert mean == pytest.approx(0.6 + 0.2 / 4.0)
+    assert variance == pytest.approx(0.6 + 0.2 / 6.0 - mean**2)

@@ -199,3 +199,25 @@ def test_steps_tell_direction_reliability_and_height_where_there_is_air() -> Non
     assert 50.0 < (steps[-1].class_pct or 0.0) <= 100.0
     assert steps[-1].planimetry_redundancy_pct == 0.0  # nobody calibrated the steps
     assert (steps[-1].external_reliability_m or 0.0) > (steps[-2].external_reliability_m or 0.0)
+
+
+def test_what_satellites_told_of_north_is_doubted_more_the_longer_ago_it_was() -> None:
+    """Without a compass nobody else knows: the doubt is theirs, and grows as a gyro drifts."""
+    stream = trunk_walk(150.0, azimuth=lambda t: np.full_like(t, 0.5 * np.pi))
+    navigator, settings = BodyNavigator(), BodySettings().heading
+    doubts: list[tuple[float, float]] = []
+    for second in range(150):
+        cut = slice(100 * second, 100 * (second + 1))
+        steps = navigator.process(stream.time_ns[cut], stream.accel[cut], stream.gyro[cut])
+        doubts += [
+            (second, math.sqrt(step.azimuth_sigma_rad**2 - settings.sway_sigma_rad**2)) for step in steps
+        ]
+        if second < 60:
+            navigator.hear_fix(START_NS + second * 10**9, 1.3 * second, 0.0, 3.0)
+    first, taught, last = (next(doubt for at, doubt in doubts if at >= since) for since in (5, 60, 145))
+    assert first > 1.0
+    assert taught < 0.25
+    drifted = settings.gyro_drift_rad_s * (
+        145.0 - 54.0
+    )  # the last stretch ended some seconds before the minute
+    assert last == pytest.approx(math.hypot(taught, drifted), rel=0.1)

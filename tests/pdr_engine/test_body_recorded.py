@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pdr_engine.body import BodyNavigator
+from proving_ground.evaluation.body.train import Interval, length_gradients, train
 from proving_ground.evaluation.evaluate import evaluate_task, plan
-from proving_ground.evaluation.train_body import Interval, length_gradients, train
 from sensor_gateway.recordings import load_runs
 from support.recorded import recorded_data
 

@@ -22,7 +22,7 @@ from pdr_engine.foot.memory import AID_STATES, fresh_state
 from pdr_engine.foot.parameters import parameters
 from pdr_engine.foot.settings import UNCALIBRATED, MagnetometerCalibration
 from proving_ground.evaluation.evaluate import evaluate_task, plan
-from proving_ground.evaluation.long_walks import (
+from proving_ground.evaluation.foot.long_walks import (
     EARTH,
     MOUNTING,
     PLACE,

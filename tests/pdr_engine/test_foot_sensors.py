@@ -274,3 +274,15 @@ def test_left_handed_axes_and_wrong_units_are_noticed_and_nothing_else_is() -> N
     assert contradicts_itself(Stream(stream.time_ns, stream.accel, np.degrees(stream.gyro)))
     assert not contradicts_itself(stream)
     assert not contradicts_itself(Stream(stream.time_ns, 1.03 * stream.accel, 0.97 * stream.gyro))
+
+
+def test_only_what_a_cut_peak_turns_about_the_vertical_is_taken_for_a_turn() -> None:
+    """Peaks about a level axis take tilt along, which gravity tells; those about one that leans take yaw too."""
+    cut = ImuQuality(gyro_limit_rad_s=math.radians(400.0))
+    level = stream_of(RUN, quality=cut)
+    leaning = stream_of(RUN, quality=cut, mounting=Rotation.from_euler("x", 30.0, degrees=True))
+    turns = [
+        float(np.median([step.common_turn_sigma_rad_s for step in navigate(stream).steps]))
+        for stream in (level, leaning)
+    ]
+    assert turns[1] > 2.0 * turns[0]

@@ -8,10 +8,10 @@ import pytest
 
 from bootprint.stopping import Stop
 from proving_ground.exercises.exercise import Fault
-from proving_ground.exercises.heard import Heard
-from proving_ground.exercises.result import Played, Result, result_of
+from proving_ground.exercises.processes.stage import Play, Stage
+from proving_ground.exercises.scoring.heard import Heard
+from proving_ground.exercises.scoring.result import Played, Result, result_of
 from proving_ground.exercises.squad import COMMAND_POST, simulated_squad, squad_of
-from proving_ground.exercises.stage import Play, Stage
 from support.waiting import wait_until
 
 pytestmark = [pytest.mark.processes, pytest.mark.xdist_group("processes"), pytest.mark.timeout(180)]

@@ -10,11 +10,11 @@ import pytest
 from bootprint.messages import Position
 from bootprint.stopping import Stop
 from bootprint.topics import Identity
-from proving_ground.exercises.emulated_radio import NetCounts
 from proving_ground.exercises.exercise import REALM, Soldier
-from proving_ground.exercises.heard import Heard
+from proving_ground.exercises.processes.emulated_radio import NetCounts
+from proving_ground.exercises.processes.stage import Play, Stage
+from proving_ground.exercises.scoring.heard import Heard
 from proving_ground.exercises.squad import COMMAND_POST, LEADER, UNIT, squad_of
-from proving_ground.exercises.stage import Play, Stage
 from proving_ground.inprocess import play_run, positions_of
 from support.golden import FUSION, ORIGIN, PDR, START, small_walk
 from support.waiting import wait_until

@@ -16,7 +16,7 @@ from bootprint.messages import Health, Position
 from bootprint.processes import ProcessGroup, ProcessSpec
 from bootprint.zenoh_bus import open_bus
 from fusion.engine import SUBJECTS
-from proving_ground.exercises.exercise_files import write_toml
+from proving_ground.exercises.processes.exercise_files import write_toml
 from proving_ground.inprocess import positions_of
 from support.golden import FUSION, PDR, REALM, SOLDIER, WALK, play_small_walk, small_walk
 from support.routers import running_router

@@ -15,9 +15,9 @@ from bootprint.display import shown
 from bootprint.geodesy import ground_offset
 from bootprint.messages import Observation, Track
 from bootprint.topics import SUBJECT_OF
+from proving_ground.exercises.event_time.line import Line
+from proving_ground.exercises.event_time.shown_play import Pace, ShownPlay, walked_exercise
 from proving_ground.exercises.exercise import Exercise
-from proving_ground.exercises.line import Line
-from proving_ground.exercises.shown_play import Pace, ShownPlay, walked_exercise
 from sa_hub.history.archive import Archive
 from sa_hub.page.access import new_token
 from sa_hub.page.settings import PageSettings

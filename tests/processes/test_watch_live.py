@@ -15,7 +15,7 @@ from bootprint.bus import Envelope
 from bootprint.messages import Alert, Fix, Message, Observation, Position, Status
 from bootprint.mgrs import mgrs
 from bootprint.topics import Identity
-from proving_ground.exercises.stage import free_ports
+from proving_ground.exercises.processes.stage import free_ports
 from support.hub_processes import A1, CP, Hub, running, write_computer, write_realm
 from support.hub_squad import ORIGIN, START_NS, Walk, position
 from support.terminal import running_in_terminal

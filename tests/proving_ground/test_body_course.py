@@ -2,7 +2,7 @@
 
 import pytest
 
-from proving_ground.evaluation.body_course import COURSE_M, run_course
+from proving_ground.evaluation.body.course import COURSE_M, run_course
 
 
 @pytest.mark.parametrize("person", ["average", "tall", "heavy"])

@@ -1,6 +1,6 @@
 """A walk around blocks with iron put on, through the whole chain."""
 
-from proving_ground.evaluation.body_worn_iron import worn_iron_deg
+from proving_ground.evaluation.body.worn_iron import worn_iron_deg
 
 
 def test_a_compass_with_iron_put_on_calibrates_itself_and_the_azimuth_follows() -> None:

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from bootprint.config import convert
 from bootprint.errors import BootprintError, ConfigError, RecordingError
 from pdr_engine.config import PdrConfig
-from proving_ground import calibration
+from proving_ground.calibration import foot_magnetometer as calibration
 
 HARD = np.array([12.0, -20.0, 5.0])
 REALM = """

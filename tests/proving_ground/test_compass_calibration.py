@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from bootprint.errors import ConfigError, RecordingError
-from proving_ground.calibration import register
+from proving_ground.calibration.foot_magnetometer import register
 
 WORN = Rotation.from_euler("ZYX", [0.0, 0.2, -0.1])  # device to level, yaw free
 HARD = np.array([5.0, -3.0, 2.0])

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from proving_ground.exercises.emulated_radio import Air, EmulatedNet, NetProfile
+from proving_ground.exercises.processes.emulated_radio import Air, EmulatedNet, NetProfile
 from support.waiting import PATIENCE_S, wait_until
 
 FAST = NetProfile("test", rate_bits_per_s=1e6, latency_s=0.0)

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from bootprint.errors import ConfigError
-from proving_ground.exercises.capacity import check_memory
+from proving_ground.exercises.processes.capacity import check_memory
 
 
 def test_a_platoon_fits_where_a_company_does_not() -> None:

@@ -8,9 +8,9 @@ import typer
 from typer.testing import CliRunner
 
 from bootprint.errors import ConfigError
-from proving_ground.exercises import run_command
-from proving_ground.exercises.comparison import compare_results, read_result
-from proving_ground.exercises.statistics import mean_of
+from proving_ground.exercises.commands import run as run_command
+from proving_ground.exercises.scoring.comparison import compare_results, read_result
+from proving_ground.exercises.scoring.statistics import mean_of
 from proving_ground.exercises.sweep import aggregate, combinations, parse_values, play_seed, sweep_locally
 
 

@@ -11,17 +11,17 @@ from bootprint.errors import ConfigError
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import Position
 from bootprint.recording import Recording
-from proving_ground.exercises.emulated_radio import Air, NetProfile
+from proving_ground.exercises.event_time.inprocess_play import line_job, play_in_process
+from proving_ground.exercises.event_time.line import play_line
 from proving_ground.exercises.exercise import Exercise, Fault, Net
-from proving_ground.exercises.exercise_files import hub_settings, soldier_settings
-from proving_ground.exercises.inprocess_play import line_job, play_in_process
-from proving_ground.exercises.line import play_line
-from proving_ground.exercises.report import write_report
-from proving_ground.exercises.result import Played, Result, result_of
-from proving_ground.exercises.score import fused_track
+from proving_ground.exercises.processes.emulated_radio import Air, NetProfile
+from proving_ground.exercises.processes.exercise_files import hub_settings, soldier_settings
+from proving_ground.exercises.reporting.report import write_report
+from proving_ground.exercises.scoring.result import Played, Result, result_of
+from proving_ground.exercises.scoring.score import fused_track
+from proving_ground.exercises.scoring.truth_record import TRUTH_REALM
 from proving_ground.exercises.settings import with_settings
 from proving_ground.exercises.squad import COMMAND_POST, LEADER, simulated_squad
-from proving_ground.exercises.truth_record import TRUTH_REALM
 from proving_ground.inprocess import play_run, positions_of
 
 LENGTH_S = 30.0

@@ -3,7 +3,7 @@
 import pytest
 
 from bootprint.clock import NS_PER_S
-from proving_ground.exercises.heard import Heard, latencies_ms
+from proving_ground.exercises.scoring.heard import Heard, latencies_ms
 
 
 def test_the_start_is_told_by_itself() -> None:

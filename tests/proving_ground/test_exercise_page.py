@@ -5,8 +5,13 @@ from contextlib import closing
 from pathlib import Path
 
 from proving_ground.exercises.demo import page_port
-from proving_ground.exercises.exercise_files import Ports, forget_history, write_computer, write_plan
-from proving_ground.exercises.shown_play import walked_exercise
+from proving_ground.exercises.event_time.shown_play import walked_exercise
+from proving_ground.exercises.processes.exercise_files import (
+    Ports,
+    forget_history,
+    write_computer,
+    write_plan,
+)
 from sa_hub.history.archive import Archive
 
 

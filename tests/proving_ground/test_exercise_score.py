@@ -10,11 +10,11 @@ import pytest
 from bootprint.clock import NS_PER_S
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import FootStep, LinkReport, Position, Track
-from proving_ground.exercises.dead_reckoning import dead_reckoning_row
 from proving_ground.exercises.exercise import ORIGIN, Exercise, Soldier
-from proving_ground.exercises.heard import ReportLog
-from proving_ground.exercises.picture import Ages, picture_row, sample_picture
-from proving_ground.exercises.score import compare, link_row, soldier_row
+from proving_ground.exercises.scoring.dead_reckoning import dead_reckoning_row
+from proving_ground.exercises.scoring.heard import ReportLog
+from proving_ground.exercises.scoring.picture import Ages, picture_row, sample_picture
+from proving_ground.exercises.scoring.score import compare, link_row, soldier_row
 from sensor_gateway.recordings.run import Run, Truth
 
 START_NS = 1_000 * NS_PER_S

@@ -10,9 +10,9 @@ from bootprint.bus import Envelope
 from bootprint.messages import CameraMotion, GnssFix, ImuBatch, Pressure
 from bootprint.topics import Identity
 from proving_ground.exercises.exercise import Exercise, Fault, Soldier
-from proving_ground.exercises.mavlink_out import PLACES, mavlink_frames
-from proving_ground.exercises.run_files import with_files, without_samples
-from proving_ground.exercises.sensor_faults import with_faults
+from proving_ground.exercises.faults.sensor_faults import with_faults
+from proving_ground.exercises.processes.mavlink_out import PLACES, mavlink_frames
+from proving_ground.exercises.processes.run_files import with_files, without_samples
 from sensor_gateway.intake import Intake
 from sensor_gateway.recordings import load_runs
 from sensor_gateway.recordings.run import CameraSeries, GnssSeries, ImuSeries, PressureSeries, Run, Truth

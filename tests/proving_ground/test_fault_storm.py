@@ -15,18 +15,18 @@ from bootprint.clock import NS_PER_S
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import Health, Track
 from bootprint.topics import Identity
-from proving_ground.exercises import reliability_page
-from proving_ground.exercises.emulated_radio import Air, NetProfile, Parting
+from proving_ground.exercises.event_time.inprocess_play import line_job
+from proving_ground.exercises.event_time.line import Line, play_line
 from proving_ground.exercises.exercise import Exercise, Fault, Soldier
-from proving_ground.exercises.heard import Heard
-from proving_ground.exercises.inprocess_play import line_job
-from proving_ground.exercises.line import Line, play_line
-from proving_ground.exercises.memory_growth import memory_growth
-from proving_ground.exercises.observer import in_umpires_time
-from proving_ground.exercises.process_faults import Outage
-from proving_ground.exercises.recovery import fault_rows, storm_summary
+from proving_ground.exercises.faults import reliability_page
+from proving_ground.exercises.faults.memory_growth import memory_growth
+from proving_ground.exercises.faults.process_faults import Outage
+from proving_ground.exercises.faults.recovery import fault_rows, storm_summary
+from proving_ground.exercises.faults.storm import KINDS, NEXT_AFTER_S, over_at_s, with_storm
+from proving_ground.exercises.processes.emulated_radio import Air, NetProfile, Parting
+from proving_ground.exercises.processes.observer import in_umpires_time
+from proving_ground.exercises.scoring.heard import Heard
 from proving_ground.exercises.squad import COMMAND_POST, squad_of
-from proving_ground.exercises.storm import KINDS, NEXT_AFTER_S, over_at_s, with_storm
 from proving_ground.positions import position_at
 from sensor_gateway.recordings.run import Truth
 from support.golden import ORIGIN, START, TESTS, small_walk

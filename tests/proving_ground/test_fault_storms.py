@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import typer
 
-from proving_ground.exercises.storms import Conditions, open_run, verdicts
+from proving_ground.exercises.faults.storms import Conditions, open_run, verdicts
 
 
 def storm(*, growth: float | None = 0.2, **changes: Any) -> dict[str, Any]:

@@ -9,8 +9,8 @@ import psutil
 
 from bootprint.processes import ProcessGroup, ProcessSpec
 from proving_ground.exercises.exercise import Fault
-from proving_ground.exercises.process_faults import ProcessFaults
-from proving_ground.exercises.stage import Stage
+from proving_ground.exercises.faults.process_faults import ProcessFaults
+from proving_ground.exercises.processes.stage import Stage
 from support.waiting import wait_until
 
 WRITER = """

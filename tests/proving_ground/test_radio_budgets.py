@@ -6,7 +6,7 @@ from importlib import resources
 
 import pytest
 
-from proving_ground.radio_budgets import Sent, check, play
+from proving_ground.radio_trials.budgets import Sent, check, play
 from sa_hub.radio.profiles import names
 from sa_hub.settings import LinkProfile
 

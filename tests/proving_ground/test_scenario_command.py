@@ -11,7 +11,7 @@ import typer
 from typer.testing import CliRunner
 
 from bootprint.errors import ConfigError
-from proving_ground.exercises.exercise_command import register
+from proving_ground.exercises.commands.group import register
 from proving_ground.scenario import library, load_scenario
 from proving_ground.scenario.canvas import Canvas
 from proving_ground.scenario.keys_page import BEGIN, END, page_with
@@ -153,7 +153,7 @@ def test_times_on_a_ruler() -> None:
 
 def test_help_does_not_wait_for_what_it_does_not_need() -> None:
     code = (
-        "import sys, proving_ground.exercises.exercise_command as c; "
+        "import sys, proving_ground.exercises.commands.group as c; "
         "sys.exit(bool({'shapely', 'scipy', 'matplotlib'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 import pytest
 
 from bootprint.errors import ConfigError
-from proving_ground.exercises.free_ports import free_ports
+from proving_ground.exercises.processes.free_ports import free_ports
 from sa_hub.radio.links.udp import UdpLink
 from sa_hub.settings import LinkProfile
 from support.hub_squad import START_NS, S, Walk, hub, position

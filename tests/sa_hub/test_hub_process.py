@@ -9,7 +9,7 @@ import pytest
 
 from bootprint.bus import Envelope
 from bootprint.messages import Health, Position
-from proving_ground.exercises.free_ports import free_ports
+from proving_ground.exercises.processes.free_ports import free_ports
 from support.hub_processes import A1, CP, command, running, write_computer, write_realm
 from support.hub_squad import START_NS, S, Walk, position
 from support.waiting import wait_until

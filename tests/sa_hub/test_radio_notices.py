@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bootprint.bus import Envelope
 from bootprint.messages import Alert, Message, Observation
-from proving_ground.radio_trials import Room, Trial, alerts
+from proving_ground.radio_trials.delivery import Room, Trial, alerts
 from sa_hub.radio.answers import Answers
 from sa_hub.radio.content import AlertNotice, ObservationNotice, StatusNotice
 from sa_hub.radio.control import MOST_ACKNOWLEDGED, Acknowledgement, Asked, Fragment

@@ -56,6 +56,7 @@ def test_the_quick_look_refuses_no_frame_that_pays(
     wares = Wares(
         worth=worth[None, :],
         behind=np.zeros((1, n), dtype=np.int64),
+        needs=np.zeros(n, dtype=np.int64),
         bits=np.ones(n),
         velocity_bits=np.ones(n),
         steady=np.full((n, DEPTH), steady),

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bootprint.errors import ConfigError
-from sa_hub.radio.counters import Block, FileCounters, MemoryCounters, _Reserved
+from sa_hub.radio.counters import COUNTERS, Block, FileCounters, MemoryCounters, _Reserved
 from sa_hub.radio.errors import FrameError
 from sa_hub.radio.header import Header, read_header
 from sa_hub.radio.replay import Heard
@@ -447,6 +447,13 @@ def test_an_epoch_without_room_is_followed_by_the_next(tmp_path: Path) -> None:
     assert HostClock(0.0).counters(path).reserve() == Block(6, 0, 4)
     path.write_text('{"epoch": 5, "end": 262140}')
     assert HostClock(0.0).counters(path).reserve() == Block(5, 262140, 262144)
+
+
+def test_counters_in_memory_end_as_those_on_disk_do() -> None:
+    counters = MemoryCounters(epoch=5, block=1 << 16)
+    blocks = [counters.reserve() for _ in range((COUNTERS >> 16) + 1)]
+    assert blocks[-2] == Block(5, COUNTERS - (1 << 16), COUNTERS)
+    assert blocks[-1] == Block(6, 0, 1 << 16)
 
 
 def test_the_last_epoch_is_used_to_its_end_and_then_a_new_key_is_asked_for(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from proving_ground.radio_trials import RIGHT_M, Room, Trial, late_joiner, outage
+from proving_ground.radio_trials.delivery import RIGHT_M, Room, Trial, late_joiner, outage
 from sa_hub.radio.control import Request
 from sa_hub.radio.frame import Codec
 from sa_hub.radio.seal import NetKeys, Opener

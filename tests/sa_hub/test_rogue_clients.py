@@ -27,7 +27,7 @@ from bootprint.messages import Fix, Health, Message, Track
 from bootprint.topics import Identity
 from bootprint.zenoh_bus import ZenohBus, open_bus
 from bootprint.zenoh_config import client_settings
-from proving_ground.exercises.free_ports import free_ports
+from proving_ground.exercises.processes.free_ports import free_ports
 from sa_hub.assembly import build_hub
 from sa_hub.keys import load_group_key
 from sa_hub.radio.counters import MemoryCounters

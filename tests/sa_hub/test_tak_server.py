@@ -21,7 +21,7 @@ from bootprint.display import Ages
 from bootprint.foreign import ForeignTrack
 from bootprint.messages import Observation, Track
 from bootprint.service import Context, Options
-from proving_ground.exercises.free_ports import free_ports
+from proving_ground.exercises.processes.free_ports import free_ports
 from sa_hub.tak.event import CotEvent, from_xml, to_xml
 from sa_hub.tak.settings import TakSettings
 from sa_hub.tak.sink import TakSink

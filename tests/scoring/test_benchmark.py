@@ -17,9 +17,7 @@ from typer.testing import CliRunner
 
 from bootprint.cli import main
 from bootprint.errors import BootprintError
-from proving_ground.evaluation import benchmark, fresh_engine, limits
-from proving_ground.evaluation.benchmark import LIMITS, FootFigures, measure_process, one_core, walk_of
-from proving_ground.evaluation.textbook import (
+from proving_ground.evaluation.foot.textbook import (
     GRAVITY_M_S2,
     TextbookFilter,
     TextbookSettings,
@@ -29,6 +27,9 @@ from proving_ground.evaluation.textbook import (
     textbook_track,
     turned,
 )
+from proving_ground.performance import commands, foot_benchmark, fresh_engine, limits
+from proving_ground.performance.cores import one_core
+from proving_ground.performance.foot_benchmark import LIMITS, FootFigures, measure_process, walk_of
 from support.walking_foot import REST_S, STANCE_S, SWING_S, walking_foot, write_run_folder
 
 GOOD = FootFigures(1000, 12, 1.0, 0.5, 50.0, 100.0, 0.5, 100.0)
@@ -127,10 +128,10 @@ def test_the_command_measures_a_walk_and_a_fresh_engine(
 
 def run_with(monkeypatch: pytest.MonkeyPatch, figures: FootFigures, *arguments: str) -> tuple[int, str]:
     """The command where the measurement gives these figures."""
-    monkeypatch.setattr(benchmark, "measure", lambda *_: figures)
-    monkeypatch.setattr(benchmark, "walk_of", lambda _: None)
+    monkeypatch.setattr(foot_benchmark, "measure", lambda *_: figures)
+    monkeypatch.setattr(foot_benchmark, "walk_of", lambda _: None)
     app = typer.Typer()
-    benchmark.register(app)
+    commands.register(app)
     result = CliRunner().invoke(app, ["benchmark", "foot", *arguments], env={"COLUMNS": "200"})
     return result.exit_code, result.output
 

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from proving_ground.evaluation.damage_play import Outcome, played, the_walk
-from proving_ground.evaluation.damages import DAMAGES, damages_table, findings, lost, same, silent
-from proving_ground.evaluation.dual import between, feet_through, foot_messages
-from proving_ground.evaluation.fusion_feet_page import page
+from proving_ground.evaluation.fusion.damage_play import Outcome, played, the_walk
+from proving_ground.evaluation.fusion.damages import DAMAGES, damages_table, findings, lost, same, silent
+from proving_ground.evaluation.fusion.dual import between, feet_through, foot_messages
+from proving_ground.evaluation.fusion.feet_page import page
+from proving_ground.evaluation.fusion.straight_line import LineWalk, straight_line_table, walk_line
 from proving_ground.evaluation.scoring import score_track
-from proving_ground.evaluation.straight_line import LineWalk, straight_line_table, walk_line
 
 KEY = (
     "a third 0.15 s late: out of order",
@@ -77,7 +77,7 @@ def test_each_foot_is_better_for_the_other_and_smoothing_keeps_it() -> None:
 
 
 def test_the_page_needs_no_recorded_data(monkeypatch: pytest.MonkeyPatch) -> None:
-    from proving_ground.evaluation import fusion_feet_page
+    from proving_ground.evaluation.fusion import feet_page as fusion_feet_page
 
     monkeypatch.setattr(fusion_feet_page, "straight_line", lambda: [LineWalk(1, 4.5, 0.25, 1.5, 2.5)])
     monkeypatch.setattr(fusion_feet_page, "walked_loops", list)

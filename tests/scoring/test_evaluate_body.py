@@ -7,8 +7,8 @@ import pytest
 
 from pdr_engine.body import BodyNavigator, BodySettings
 from pdr_engine.body.methods import METHODS
-from proving_ground.evaluation.body import body_chain, body_track, walk_body
-from proving_ground.evaluation.body_fixes import Receiver, pns_walk, with_fixes
+from proving_ground.evaluation.body.poor_fixes import Receiver, pns_walk, with_fixes
+from proving_ground.evaluation.body.recorded_run import body_chain, body_track, walk_body
 from proving_ground.evaluation.evaluate import evaluate_task, methods_of, plan
 from proving_ground.evaluation.floors import Floors, floors_right_pct
 from sensor_gateway.recordings import load_runs

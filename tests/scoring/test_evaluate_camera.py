@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from bootprint.cli import build_app
 from bootprint.errors import RecordingError
-from proving_ground.evaluation.camera import walk_camera
+from proving_ground.evaluation.camera.recorded_run import walk_camera
 from proving_ground.evaluation.evaluate import evaluate_task, methods_of, plan
 from proving_ground.sensors import Mounting, write_camera_folder
 from sensor_gateway.recordings import load_runs

@@ -1,6 +1,6 @@
 """`bootprint benchmark federation` counts what real routers deliver."""
 
-from proving_ground.evaluation.federation_benchmark import measure
+from proving_ground.performance.federation_benchmark import measure
 
 
 def test_every_frame_reaches_every_other_post() -> None:

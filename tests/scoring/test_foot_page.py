@@ -10,13 +10,13 @@ import pytest
 
 from bootprint.errors import ConfigError
 from pdr_engine.foot import METHODS, FootSettings
-from proving_ground.evaluation import figures
-from proving_ground.evaluation.ablation import ABLATIONS, Variant, plain, rmse_of
-from proving_ground.evaluation.benchmark import LIMITS, FootFigures
 from proving_ground.evaluation.consistency import Consistency
-from proving_ground.evaluation.foot_motion_page import MotionFindings
-from proving_ground.evaluation.foot_page import Findings, page
-from proving_ground.evaluation.honesty import ClassHonesty
+from proving_ground.evaluation.foot import figures
+from proving_ground.evaluation.foot.ablation import ABLATIONS, Variant, plain, rmse_of
+from proving_ground.evaluation.foot.honesty import ClassHonesty
+from proving_ground.evaluation.foot.motion_page import MotionFindings
+from proving_ground.evaluation.foot.page import Findings, page
+from proving_ground.performance.foot_benchmark import LIMITS, FootFigures
 from sensor_gateway.recordings import load_runs
 from support.recorded import recorded_data
 from support.walking_foot import walking_foot, write_run_folder

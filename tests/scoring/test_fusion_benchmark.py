@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 
 from bootprint.cli import build_app
 from bootprint.errors import BootprintError
-from proving_ground.evaluation import fusion_benchmark
-from proving_ground.evaluation.fusion_benchmark import SCENARIO, FusionFigures, figures, table, waits_ns
 from proving_ground.exercises.source import open_exercise
+from proving_ground.performance import fusion_benchmark
+from proving_ground.performance.fusion_benchmark import SCENARIO, FusionFigures, figures, table, waits_ns
 
 GOOD = FusionFigures(100, 300.0, 420.0, 280.0, 380.0, 20.0, 45.0, 1.5, 4.0)
 SHARES = {"sensor-gateway": 1.0, "pdr-engine": 1.5, "fusion": 2.0}

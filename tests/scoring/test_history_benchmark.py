@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from bootprint.messages import Track
-from proving_ground.evaluation.history_benchmark import LIMITS, measure, spoken
+from proving_ground.performance.history_benchmark import LIMITS, measure, spoken
 
 
 def test_a_company_is_stored_asked_and_exported(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proving_ground.evaluation.consistency import StepChain
-from proving_ground.evaluation.honesty import Judged, by_motion, factor_for, mean_inside_pct
+from proving_ground.evaluation.foot.honesty import Judged, by_motion, factor_for, mean_inside_pct
 from sensor_gateway.recordings.run import Truth
 
 STRIDES = 60

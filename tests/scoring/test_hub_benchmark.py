@@ -7,11 +7,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from proving_ground.evaluation import hub_benchmark
-from proving_ground.evaluation.benchmark import register
-from proving_ground.evaluation.hub_benchmark import LIMITS, HubFigures, HubRow, measure
-from proving_ground.evaluation.hub_company import POST, Company
-from proving_ground.evaluation.hub_work import cot_events, keep_picture, merge, parse_cot
+from proving_ground.performance import hub_benchmark
+from proving_ground.performance.commands import register
+from proving_ground.performance.hub_benchmark import LIMITS, HubFigures, HubRow, measure
+from proving_ground.performance.hub_company import POST, Company
+from proving_ground.performance.hub_work import cot_events, keep_picture, merge, parse_cot
 
 GOOD = HubFigures(
     rows=(HubRow(12, 1.0, 3.0, 1.0, 2.0, 60.0),),

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from proving_ground.evaluation.alignment import FloatArray, path_lengths
-from proving_ground.evaluation.dual_walks import dual_walk
-from proving_ground.evaluation.joint_ins import JointFilter, joint_tracks
+from proving_ground.evaluation.foot.textbook import GRAVITY_M_S2, TextbookFilter, TextbookSettings
+from proving_ground.evaluation.fusion.dual_walks import dual_walk
+from proving_ground.evaluation.fusion.joint_ins import JointFilter, joint_tracks
 from proving_ground.evaluation.scoring import score_track
-from proving_ground.evaluation.textbook import GRAVITY_M_S2, TextbookFilter, TextbookSettings
 
 SETTINGS = TextbookSettings()
 REST = np.array([0.0, 0.0, GRAVITY_M_S2])

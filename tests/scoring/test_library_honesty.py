@@ -11,10 +11,10 @@ import pytest
 from bootprint.clock import NS_PER_S
 from bootprint.messages import Position, Range
 from fusion.config import FusionConfig, StartConfig
-from proving_ground.evaluation.cooperation import Seat, SquadPlay
-from proving_ground.evaluation.fusion_lines import Heard
-from proving_ground.evaluation.library_honesty import honesty, table
-from proving_ground.evaluation.long_gap import gap
+from proving_ground.evaluation.fusion.cooperation import Seat, SquadPlay
+from proving_ground.evaluation.fusion.library_honesty import honesty, table
+from proving_ground.evaluation.fusion.lines import Heard
+from proving_ground.evaluation.fusion.long_gap import gap
 from proving_ground.exercises.exercise import Exercise, Soldier
 from proving_ground.exercises.squad import squad_of
 from sensor_gateway.recordings.run import Run, Truth

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from proving_ground.evaluation.foot_heading_page import heading
-from proving_ground.evaluation.long_walks import (
+from proving_ground.evaluation.foot.heading_page import heading
+from proving_ground.evaluation.foot.long_walks import (
     EARTH,
     MOUNTING,
     Comparison,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pdr_engine.foot import FootStepEstimate
-from proving_ground.evaluation.motion_truth import CRAWLED, labelled
+from proving_ground.evaluation.foot.motion_truth import CRAWLED, labelled
 from sensor_gateway.recordings import load_runs
 from sensor_gateway.recordings.run import Truth
 from support.foot_streams import Stream, navigate

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proving_ground.evaluation import faults
-from proving_ground.evaluation.faults import FAULTS, Fault
-from proving_ground.evaluation.robustness import HEADER, Degradation, degradation_table, degradations
+from proving_ground.evaluation.foot import faults
+from proving_ground.evaluation.foot.faults import FAULTS, Fault
+from proving_ground.evaluation.foot.robustness import HEADER, Degradation, degradation_table, degradations
 from sensor_gateway.recordings import load_runs
 from sensor_gateway.recordings.run import ImuSeries
 from support.walking_foot import walking_foot, write_run_folder

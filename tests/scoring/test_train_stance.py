@@ -7,8 +7,15 @@ from scipy.optimize import approx_fprime
 from scipy.spatial.transform import Rotation
 
 from pdr_engine.foot.memory import FEATURES, HIDDEN
-from proving_ground.evaluation.stance_examples import Examples, marker_offset
-from proving_ground.evaluation.train_stance import Network, fit_motion, loss, motion_loss, source_of, train
+from proving_ground.evaluation.foot.stance_examples import Examples, marker_offset
+from proving_ground.evaluation.foot.train_stance import (
+    Network,
+    fit_motion,
+    loss,
+    motion_loss,
+    source_of,
+    train,
+)
 
 SIZE = HIDDEN * (FEATURES + 2) + 1
 

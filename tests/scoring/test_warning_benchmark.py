@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from proving_ground.evaluation.warning_benchmark import DelayRow, delays, rows_of
-from proving_ground.evaluation.warning_play import Radio, play_warnings, swings, true_dangers
+from proving_ground.radio_trials.warning_play import Radio, play_warnings, swings, true_dangers
+from proving_ground.radio_trials.warnings import DelayRow, delays, rows_of
 
 
 def test_truth_is_geometry() -> None:

@@ -4,16 +4,17 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
 
 from bootprint.bus import Envelope
+from bootprint.config import load_computer
 from bootprint.messages import Health, Pressure
-from bootprint.service import PROMPT_BEAT_S, Context, Service
+from bootprint.service import Context, Options, Service, _inlet, run
 from bootprint.topics import Identity
-from bootprint.zenoh_bus import ZenohBus, open_bus
+from bootprint.zenoh_bus import RingingInlet, ZenohBus, open_bus
 from support.echo_service import build
 from support.routers import free_endpoint, running_router
 from support.waiting import wait_until
@@ -77,7 +78,7 @@ def test_signals_end_it_cleanly_and_its_last_word_is_stopped(tmp_path: Path, num
         wait_until(lambda: health[-1].state == "stopped")
 
 
-@pytest.mark.parametrize(("arguments", "beat_s"), [((), PROMPT_BEAT_S), (("--beat", "0.2"), 0.2)])
+@pytest.mark.parametrize(("arguments", "beat_s"), [((), 0.07), (("--beat", "0.2"), 0.2)])
 def test_it_looks_at_the_bus_as_often_as_it_chooses_or_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], beat_s: float
 ) -> None:
@@ -90,8 +91,31 @@ def test_it_looks_at_the_bus_as_often_as_it_chooses_or_is_told(
     monkeypatch.setattr("bootprint.service.run", noted)
     monkeypatch.setattr(sys, "argv", ["echo", "--config", str(write_config(tmp_path)), *arguments])
     with pytest.raises(SystemExit) as ended:
-        Service("echo", "Repeats pressures.", ("pressure",), build, PROMPT_BEAT_S).main()
+        Service("echo", "Repeats pressures.", ("pressure",), build, 0.07).main()
     assert (ended.value.code, told) == (0, [beat_s])
+
+
+@pytest.mark.timeout(90)
+def test_what_rings_is_looked_at_long_before_the_next_beat(tmp_path: Path) -> None:
+    with running_router() as router:
+        config, hour_s = write_config(tmp_path), 3600.0
+        context = Context("echo", load_computer(config), Options(config, router, beat_s=hour_s))
+        pressure = Envelope(A1.address("pressure", "baro"), Pressure(time_ns=1, pressure_pa=1000.0))
+        with closing(open_bus(router)) as bus:  # health is told after the first look, an echo after the next
+            bus.subscribe(A1.selector("health"), lambda _: bus.publish(pressure))
+            bus.subscribe(A1.selector("pressure", "echo"), lambda _: context.finish())
+            ringing = Service("echo", "Repeats.", ("pressure",), build, hour_s, ringing=("pressure",))
+            assert run(ringing, context) == 0
+
+
+@pytest.mark.parametrize(("beat_s", "rings"), [(0.05, True), (0.2, False)])
+def test_who_asks_for_longer_pauses_is_not_rung_for(tmp_path: Path, beat_s: float, *, rings: bool) -> None:
+    service = Service("echo", "Repeats.", ("pressure",), build, 0.05, ringing=("pressure",))
+    with running_router() as router:
+        config = write_config(tmp_path)
+        context = Context("echo", load_computer(config), Options(config, router, beat_s=beat_s))
+        with closing(context.connect()):
+            assert isinstance(_inlet(service, context, "pressure"), RingingInlet) is rings
 
 
 def test_closing_its_input_ends_it(tmp_path: Path) -> None:

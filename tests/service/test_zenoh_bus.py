@@ -165,6 +165,20 @@ def test_an_inlet_keeps_messages_until_they_are_taken() -> None:
         receiver.close()
 
 
+def test_an_inlet_rings_for_what_has_come_and_keeps_it() -> None:
+    with running_router() as router:
+        sender, receiver = open_bus(router), open_bus(router)
+        rung: list[None] = []
+        inlet = receiver.open_inlet(A1.selector("foot_step"), lambda: rung.append(None))
+        for n in range(1, 4):
+            sender.publish(step(n))
+        wait_until(lambda: len(rung) == 3, what="three bells")
+        assert list(inlet.take()) == [step(1), step(2), step(3)]
+        assert list(inlet.take()) == []
+        sender.close()
+        receiver.close()
+
+
 def test_a_full_inlet_is_counted_and_goes_on_with_the_newest(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(zenoh_bus, "_CHANNEL_SIZE", 8)
     with running_router() as router:

@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 from bootprint.processes import ProcessError, ProcessGroup, ProcessSpec
-from proving_ground.exercises.free_ports import free_ports
+from proving_ground.exercises.processes.free_ports import free_ports
 from support.routers import free_endpoint
 from support.waiting import wait_until
 

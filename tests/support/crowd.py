@@ -24,7 +24,7 @@ from bootprint.config import load_realm
 from bootprint.geodesy import LocalFrame
 from bootprint.messages import Health
 from bootprint.zenoh_bus import ZenohBus, open_bus
-from proving_ground.exercises.free_ports import free_ports
+from proving_ground.exercises.processes.free_ports import free_ports
 from sa_hub.keys import load_group_key
 from sa_hub.radio.content import Report, Reports
 from sa_hub.radio.counters import MemoryCounters

@@ -34,7 +34,7 @@ from bootprint.errors import RecordingError
 from bootprint.messages import Alert, Health, Status
 from bootprint.recording import Recording
 from bootprint.zenoh_bus import ZenohBus, open_bus
-from proving_ground.exercises.stage import free_ports
+from proving_ground.exercises.processes.stage import free_ports
 from sa_hub.history.archive import Archive
 from sa_hub.history.settings import DEFAULT_SUBJECTS
 from support.databases import new_database, postgres

@@ -12,7 +12,7 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Browser
 
-from proving_ground.exercises.shown_play import Pace, ShownPlay, walked_exercise
+from proving_ground.exercises.event_time.shown_play import Pace, ShownPlay, walked_exercise
 from sa_hub.history.archive import Archive
 from support.browser import CAN_RUN, WHY_NOT, Tab, running_chromium, tab
 from support.waiting import wait_until

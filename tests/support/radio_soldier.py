@@ -6,7 +6,7 @@ from pathlib import Path
 from bootprint.bus import Envelope
 from bootprint.config import load_realm
 from bootprint.messages import Alert
-from proving_ground.exercises.free_ports import free_ports
+from proving_ground.exercises.processes.free_ports import free_ports
 from sa_hub.assembly import build_hub
 from sa_hub.keys import load_group_key
 from sa_hub.radio.content import AlertNotice

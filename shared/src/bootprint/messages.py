@@ -23,6 +23,7 @@ Int64Array = npt.NDArray[np.int64]
 Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
 Longitude = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
+Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 Percent = Annotated[float, msgspec.Meta(ge=0.0, le=100.0)]
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
 TimeNs = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
@@ -272,7 +273,8 @@ class BodyStep(Message, frozen=True):
     step that ended at that time, some steps earlier, was by all that followed. ``floor`` counts from where the walk
     began. Redundancy percentages say how much of the information is checked by other information;
     ``external_reliability_m`` what disturbances that nobody noticed may have done to the place since the last
-    absolute fix.
+    absolute fix. ``taught_scale`` and ``taught_turn_rad`` (clockwise) are what satellites have taught of the
+    person's steps and of how the unit sits: length and azimuth hold them.
     """
 
     start_time_ns: TimeNs
@@ -298,6 +300,8 @@ class BodyStep(Message, frozen=True):
     settled_motion: MotionClass | None = None
     settled_direction: Direction | None = None
     track_azimuth_rad: float | None = None
+    taught_scale: Positive = 1.0
+    taught_turn_rad: float = 0.0
 
 
 class Fix(Message, frozen=True):

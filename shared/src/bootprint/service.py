@@ -1,12 +1,11 @@
 """The scaffold of every service: arguments, logging, signals, router, liveliness, health, and a clean end.
 
 A service is a `Part` (its core plus whatever it opens) in a loop of one thread: messages are fetched from the bus
-many times a second, posted jobs come through an inbox at once, `tick` comes with host time, outputs go to the bus.
-So a core is never called from two threads, and a quiet process sleeps.
+many times a second, and soon after one of those that ring; posted jobs come through an inbox at once, `tick` comes
+with host time, outputs go to the bus. So a core is never called from two threads, and a quiet process sleeps.
 """
 
 import gc
-import queue
 import resource
 import sys
 import time
@@ -25,20 +24,19 @@ from bootprint.clock import EventClock, make_clock
 from bootprint.config import Computer, load_computer
 from bootprint.errors import BootprintError
 from bootprint.figures import Figures
+from bootprint.inbox import Inbox, Job
 from bootprint.messages import Health
 from bootprint.stopping import Stop
 from bootprint.topics import Identity
 from bootprint.zenoh_bus import Inlet, ZenohBus, open_bus
 
-_INBOX_SIZE = 20_000
 DEFAULT_BEAT_S = 0.05
-PROMPT_BEAT_S = 0.02  # of who stands between sensors and position: each look adds to how late it is
 _LEAST_BEAT_S = 0.002
+# Of a beat, and at most: what comes so soon after a message that rings is looked at with it.
+_GATHERED, _LONGEST_GATHER_S = 0.05, 0.01
 _TICK_S = 0.1
 _HEALTH_S = 1.0
 EXIT_BAD_INPUT = 2
-
-Job = Callable[[], Iterable[Envelope]]
 
 
 class Part(Protocol):
@@ -128,8 +126,7 @@ class Context:
         )
         self.lossless = options.speed == "max"
         self.beat_s = _beat_s(options)
-        self.inbox: queue.Queue[Job] = queue.Queue(_INBOX_SIZE)
-        self.inbox_dropped = 0
+        self.inbox = Inbox(min(_GATHERED * self.beat_s, _LONGEST_GATHER_S))
         self.stopping = Stop()
         self.exit_code = 0
         self._bus: ZenohBus | None = None
@@ -158,13 +155,7 @@ class Context:
 
     def post(self, job: Job) -> None:
         """Run ``job`` in the main loop and publish what it returns; from any thread."""
-        if self.lossless:
-            self.inbox.put(job)
-            return
-        try:
-            self.inbox.put_nowait(job)
-        except queue.Full:
-            self.inbox_dropped += 1
+        self.inbox.post(job, patient=self.lossless)
 
     def wait_alive(self, services: Sequence[str], timeout_s: float = 30.0) -> bool:
         """Wait until these services of this soldier hold their liveliness tokens; False if not in time."""
@@ -189,7 +180,8 @@ class Context:
 class Service:
     """A service: its name (also its command and its liveliness token), its inputs and how its part is built.
 
-    ``beat_s``: between two looks at the bus, unless the command line says otherwise.
+    ``beat_s``: between two looks at the bus, unless the command line says otherwise. ``ringing``: those of its
+    inputs that are looked at soon after they come, for who waits for them (a thread each), unless it says more.
     """
 
     name: str
@@ -197,6 +189,7 @@ class Service:
     subjects: tuple[str, ...]
     build: Callable[[Context], Part]
     beat_s: float = DEFAULT_BEAT_S
+    ringing: tuple[str, ...] = ()
 
     def main(self) -> None:
         """The console script: parse arguments, run, exit (2 with one line on bad input)."""
@@ -269,7 +262,7 @@ def _run(service: Service, context: Context) -> int:
     part = service.build(context)
     bus = context.connect()
     try:
-        inlets = [bus.open_inlet(context.identity.selector(subject)) for subject in service.subjects]
+        inlets = [_inlet(service, context, subject) for subject in service.subjects]
         part.start()
         bus.declare_alive(context.identity, service.name)
         gc.collect()
@@ -281,6 +274,16 @@ def _run(service: Service, context: Context) -> int:
         context.stopping.finish()
         bus.close()
     return context.exit_code
+
+
+def _inlet(service: Service, context: Context, subject: str) -> Inlet:
+    """A subject's messages.
+
+    Nothing rings for who was told to look less often, to save processor, nor at full speed, where the loop looks
+    all the time and messages have to push back.
+    """
+    rings = subject in service.ringing and not context.lossless and context.options.beat_s <= service.beat_s
+    return context.bus.open_inlet(context.identity.selector(subject), context.inbox.ring if rings else None)
 
 
 def _resident_mb() -> float:
@@ -329,20 +332,14 @@ class _Loop:
         self._guarded(lambda: self._health(stopped=True))
 
     def _work(self, until: float) -> None:
-        """Do posted jobs as they come, until a host time; one that waits already is done in any case."""
-        inbox = self._context.inbox
-        try:
-            while True:
-                wait_s = until - time.monotonic()
-                self._guarded(inbox.get(timeout=wait_s) if wait_s > 0.0 else inbox.get_nowait())
-                if time.monotonic() > until + _TICK_S:
-                    return
-        except queue.Empty:
-            return
+        """Do posted jobs as they come, until a host time or the bell."""
+        for job in self._context.inbox.jobs(until):
+            self._guarded(job)
 
     def _fetch(self) -> bool:
         """Hand over what waits on the bus; whether there was anything."""
         found = False
+        self._context.inbox.answer()
         for inlet in self._inlets:
             for envelope in inlet.take():
                 found = True
@@ -387,7 +384,7 @@ class _Loop:
                     "handler_errors": self._errors,
                     "bus_rejected": context.bus.rejected,
                     "bus_overruns": context.bus.overruns,
-                    "inbox_dropped": context.inbox_dropped,
+                    "inbox_dropped": context.inbox.dropped,
                     "router_losses": self._router_losses,
                 },
                 gauges={

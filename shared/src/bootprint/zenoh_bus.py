@@ -3,15 +3,18 @@
 Every process is a *client* of one router per computer; scouting, gossip and shared memory are off. What was
 learned the hard way is kept here: sessions open in a loop that can be interrupted; samples leave zenoh through a
 channel (a slow plain callback would stall the whole session and keep the process from exiting), which a service
-empties when it likes (`Inlet`: waking threads for every message costs more than the messages do) and a tool by a
-thread per subscription; on closing, the session goes first and the threads are joined after it.
+empties when it likes (`Inlet`: waking threads for every message costs more than the messages do; `RingingInlet`:
+for the few whose delay is worth that) and a tool by a thread per subscription; on closing, the session goes first
+and the threads are joined after it.
 """
 
 import json
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import zenoh
 from zenoh import ext
@@ -49,10 +52,13 @@ class Inlet:
         self.overruns = 0
         """Times that the channel was found full: older messages may have been dropped."""
 
+    def _next(self) -> zenoh.Sample | None:
+        return self._samples.try_recv()
+
     def take(self) -> Iterator[Envelope]:
         """What waits now, in the order of its arrival; at most a channel full."""
         for count in range(1, _CHANNEL_SIZE + 1):
-            sample = self._samples.try_recv()
+            sample = self._next()
             if sample is None:
                 return
             self.overruns += self._bounded and count == _CHANNEL_SIZE
@@ -66,6 +72,23 @@ class Inlet:
         except WireError:
             self.rejected += 1
             return None
+
+
+class RingingInlet(Inlet):
+    """An inlet that tells of every arrival, from a thread in which `attend` runs."""
+
+    def __init__(self, subscriber: _Subscriber, bounded: bool) -> None:
+        super().__init__(subscriber, bounded)
+        self._waiting: deque[zenoh.Sample] = deque(maxlen=_CHANNEL_SIZE)
+
+    def attend(self, ring: Callable[[], None]) -> None:
+        """Let messages wait, and ring for each, until the subscription ends."""
+        for sample in self._samples:
+            self._waiting.append(sample)
+            ring()
+
+    def _next(self) -> zenoh.Sample | None:
+        return self._waiting.popleft() if self._waiting else None
 
 
 def _decode(key: str, payload: bytes) -> Envelope:
@@ -217,9 +240,18 @@ class ZenohBus:
         """Times that an inlet was found full: older messages may have been dropped."""
         return sum(inlet.overruns for inlet in self._inlets)
 
-    def open_inlet(self, selector: str) -> Inlet:
-        """Let every message that matches wait until it is taken; same care as `subscribe`."""
-        inlet = Inlet(self._declared(self._new_subscriber, selector), bounded=not self._lossless)
+    def open_inlet(self, selector: str, ring: Callable[[], None] | None = None) -> Inlet:
+        """Let every message that matches wait until it is taken; same care as `subscribe`.
+
+        ``ring`` is called from a thread whenever one has come; what is not taken in time then makes room, even on
+        a bus without loss.
+        """
+        subscriber = self._declared(self._new_subscriber, selector)
+        if ring is None:
+            inlet = Inlet(subscriber, bounded=not self._lossless)
+        else:
+            inlet = RingingInlet(subscriber, bounded=True)
+            self._run(f"bell {selector}", partial(inlet.attend, ring))
         self._inlets.append(inlet)
         return inlet
 
@@ -285,8 +317,12 @@ class ZenohBus:
             for sample in subscriber.handler:
                 handler(str(sample.key_expr), sample.payload.to_bytes())
 
-        thread = threading.Thread(target=drain, name=f"bus {subscriber.key_expr}", daemon=True)
         self._subscribers.append(subscriber)
+        self._run(f"bus {subscriber.key_expr}", drain)
+
+    def _run(self, name: str, body: Callable[[], None]) -> None:
+        """A thread that ends with the session."""
+        thread = threading.Thread(target=body, name=name, daemon=True)
         self._threads.append(thread)
         thread.start()
 

@@ -17,7 +17,7 @@ from bootprint.topics import Identity
 from proving_ground.evaluation.alignment import Align, Track, count_strides, true_strides
 from proving_ground.evaluation.consistency import StepChain
 from proving_ground.evaluation.floors import Floors, floors_right_pct
-from proving_ground.evaluation.joint_ins import METHOD as JOINT
+from proving_ground.evaluation.fusion.joint_ins import METHOD as JOINT
 from proving_ground.evaluation.scoring import Scored, score_track
 from sensor_gateway.recordings.run import FEET, ImuSeries, Kind, Run
 
@@ -77,7 +77,7 @@ def methods_of(choice: str | None) -> tuple[str, ...]:
     """The methods to run: each kind's default, the one named, or all; ConfigError on an unknown name."""
     from pdr_engine.body.methods import DEFAULT
     from pdr_engine.foot import FootSettings
-    from proving_ground.evaluation.camera import METHODS as CAMERA_METHODS
+    from proving_ground.evaluation.camera.recorded_run import METHODS as CAMERA_METHODS
 
     if choice is None:
         return (FootSettings().method, DEFAULT, CAMERA_METHODS[0])
@@ -93,8 +93,8 @@ def _known_to(kind: Kind) -> tuple[str, ...]:
     """The methods that a kind's estimator has."""
     from pdr_engine.body.methods import METHODS as BODY_METHODS
     from pdr_engine.foot import METHODS
-    from proving_ground.evaluation.camera import METHODS as CAMERA_METHODS
-    from proving_ground.evaluation.dual import OWN_METHODS
+    from proving_ground.evaluation.camera.recorded_run import METHODS as CAMERA_METHODS
+    from proving_ground.evaluation.fusion.dual import OWN_METHODS
 
     by_kind = {"body": BODY_METHODS, "camera": CAMERA_METHODS, "dual": (*METHODS, *OWN_METHODS)}
     return by_kind.get(kind, METHODS)
@@ -215,8 +215,8 @@ def estimate_foot(imu: ImuSeries, method: str) -> Estimate:
 def estimate_body(run: Run, method: str) -> Estimate:
     """The body-worn unit through its navigator, message by message as on the bus."""
     from pdr_engine.body.methods import PNS_GPS, settings_of
-    from proving_ground.evaluation.body import body_chain, body_floors, body_track, walk_body
-    from proving_ground.evaluation.body_fixes import pns_walk
+    from proving_ground.evaluation.body.poor_fixes import pns_walk
+    from proving_ground.evaluation.body.recorded_run import body_chain, body_floors, body_track, walk_body
 
     imu, settings = run.imus[BODY], settings_of(method)
     if method == PNS_GPS:
@@ -241,7 +241,7 @@ def estimate_fused_foot(task: Task) -> Estimate:
     joined the other walks by itself.
     """
     from pdr_engine.foot import FootSettings
-    from proving_ground.evaluation.dual import OWN_METHODS, between, fused_feet
+    from proving_ground.evaluation.fusion.dual import OWN_METHODS, between, fused_feet
 
     fused = fused_feet(task.run, task.method, smoothed=task.smoothed)
     if task.place == FUSED:
@@ -255,7 +255,7 @@ def estimate_fused_foot(task: Task) -> Estimate:
 
 def estimate_camera(run: Run) -> Estimate:
     """The camera's pairs through stereo odometry; a sample is a pair."""
-    from proving_ground.evaluation.camera import walk_camera
+    from proving_ground.evaluation.camera.recorded_run import walk_camera
 
     walked = walk_camera(run)
     return Estimate(walked.track, walked.chain, None, len(walked.time_s), walked.seconds)
@@ -269,7 +269,7 @@ def estimate_fused(run: Run, method: str) -> Estimate:
     from fusion.config import FusionConfig
     from pdr_engine.config import PdrConfig
     from pdr_engine.foot import warm_up
-    from proving_ground.evaluation.dual import COUPLINGS, DEFAULT_COUPLING
+    from proving_ground.evaluation.fusion.dual import COUPLINGS, DEFAULT_COUPLING
     from proving_ground.inprocess import play_run, positions_of
 
     warm_up()

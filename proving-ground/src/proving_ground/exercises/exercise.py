@@ -14,7 +14,7 @@ import numpy.typing as npt
 from bootprint.clock import NS_PER_S
 from bootprint.config import Member, Origin, Realm
 from bootprint.topics import Identity
-from proving_ground.exercises.emulated_radio import NetProfile, Parting
+from proving_ground.exercises.processes.emulated_radio import NetProfile, Parting
 from sensor_gateway.recordings.run import Run, Truth
 
 FloatArray = npt.NDArray[np.float64]

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from bootprint.processes import ProcessError
     from proving_ground.exercises.exercise import Exercise
-    from proving_ground.exercises.result import Result
-    from proving_ground.exercises.stage import Play, Stage
-    from proving_ground.exercises.usage import UsageMeter
+    from proving_ground.exercises.processes.stage import Play, Stage
+    from proving_ground.exercises.processes.usage import UsageMeter
+    from proving_ground.exercises.scoring.result import Result
 
 Mode = Literal["processes", "inprocess"]
 _LINE_EVERY_S = 5.0  # host seconds between lines where there is no terminal
@@ -66,10 +66,10 @@ def play(exercise: "Exercise", how: Playing) -> Outcome:
 
 def prepare(scenario: str, seed: int, how: Playing) -> "Exercise":
     """The exercise of a scenario and a seed, built on the local processors; ConfigError if it is wrong."""
-    from proving_ground.exercises.capacity import check_memory
-    from proving_ground.exercises.run_files import with_files, without_samples
+    from proving_ground.exercises.faults.storm import with_storm
+    from proving_ground.exercises.processes.capacity import check_memory
+    from proving_ground.exercises.processes.run_files import with_files, without_samples
     from proving_ground.exercises.source import open_exercise, soldier_count
-    from proving_ground.exercises.storm import with_storm
 
     if how.mode == "processes":
         check_memory(soldier_count(scenario))
@@ -88,8 +88,8 @@ def prepare(scenario: str, seed: int, how: Playing) -> "Exercise":
 def write_outcome(outcome: Outcome, report: Path, json_out: str | None) -> None:
     """``result.json``, ``report.html``, ``--json``, and tables for people; then the error that ended it, if any."""
     from bootprint.commands.options import write_json
-    from proving_ground.exercises.report import write_report
-    from proving_ground.exercises.tables import print_scores
+    from proving_ground.exercises.reporting.report import write_report
+    from proving_ground.exercises.reporting.tables import print_scores
 
     write_report(report, outcome.result)
     if json_out != "-":
@@ -116,8 +116,8 @@ def check_outputs(report: Path, *targets: str | Path | None) -> None:
 
 
 def _in_process(exercise: "Exercise", how: Playing) -> Outcome:
-    from proving_ground.exercises.inprocess_play import play_in_process
-    from proving_ground.exercises.result import result_of
+    from proving_ground.exercises.event_time.inprocess_play import play_in_process
+    from proving_ground.exercises.scoring.result import result_of
 
     with progress_bars() as show:
         played = play_in_process(
@@ -153,8 +153,8 @@ def progress_bars() -> Iterator[Callable[[str, float], None]]:
 
 def _in_processes(exercise: "Exercise", how: Playing) -> Outcome:
     from bootprint.processes import ProcessError
-    from proving_ground.exercises.inprocess_play import SETTLE_S
-    from proving_ground.exercises.stage import Stage
+    from proving_ground.exercises.event_time.inprocess_play import SETTLE_S
+    from proving_ground.exercises.processes.stage import Stage
 
     length_s = exercise.duration_s + SETTLE_S if how.duration_s is None else how.duration_s
     fault: ProcessError | None = None
@@ -169,7 +169,7 @@ def _in_processes(exercise: "Exercise", how: Playing) -> Outcome:
 
 
 def _play_of(how: Playing) -> "Play":
-    from proving_ground.exercises.stage import Play
+    from proving_ground.exercises.processes.stage import Play
 
     return Play(how.report, how.speed, how.serial, how.record, how.page_port)
 
@@ -210,8 +210,8 @@ class Runner:
 
     def result(self) -> "Result":
         """The score of what was played."""
-        from proving_ground.exercises.heard import latencies_ms
-        from proving_ground.exercises.result import Played, result_of
+        from proving_ground.exercises.scoring.heard import latencies_ms
+        from proving_ground.exercises.scoring.result import Played, result_of
 
         stage = self._stage
         duration_s = max(stage.elapsed_s, 1e-9) if stage.start_ns else 1e-9
@@ -229,7 +229,7 @@ class Runner:
         return result_of(played, extra)
 
     def _going(self) -> bool:
-        from proving_ground.exercises.usage import UsageMeter
+        from proving_ground.exercises.processes.usage import UsageMeter
 
         if self._meter is None and self._stage.elapsed_s >= 0.0:
             self._meter = UsageMeter(self._stage.processes.all_pids)
@@ -238,7 +238,7 @@ class Runner:
         return self._stage.elapsed_s < self._length_s and not self._stop.is_set()
 
     def _lines(self, console: "Console") -> None:
-        from proving_ground.exercises.live import LiveView
+        from proving_ground.exercises.reporting.live import LiveView
 
         view = LiveView(self._stage, self._length_s)
         next_line = time.monotonic()
@@ -251,7 +251,7 @@ class Runner:
     def _live(self, console: "Console") -> None:
         from rich.live import Live
 
-        from proving_ground.exercises.live import LiveView
+        from proving_ground.exercises.reporting.live import LiveView
 
         view = LiveView(self._stage, self._length_s)
         with Live(view.render(), console=console, refresh_per_second=4, screen=False) as live:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from bootprint.errors import ConfigError
-from proving_ground.exercises.emulated_radio import NetProfile
 from proving_ground.exercises.exercise import Exercise, Soldier
-from proving_ground.exercises.exercise_files import check_exercise
+from proving_ground.exercises.processes.emulated_radio import NetProfile
+from proving_ground.exercises.processes.exercise_files import check_exercise
 from proving_ground.exercises.squad import squad_of
 from sensor_gateway.recordings.run import FEET, ImuSeries, Run, Truth
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from bootprint.errors import RecordingError
-from proving_ground.exercises.emulated_radio import NetProfile
 from proving_ground.exercises.exercise import ORIGIN, Exercise, Hub, Net, Settings, Soldier
+from proving_ground.exercises.processes.emulated_radio import NetProfile
 from proving_ground.simulation.walker import Gait, GnssQuality, simulate_walk
 from sensor_gateway.recordings import load_runs
 from sensor_gateway.recordings.run import Run, Truth

@@ -15,14 +15,14 @@ import numpy as np
 
 from bootprint.clock import NS_PER_S
 from bootprint.errors import BootprintError, ConfigError
+from proving_ground.exercises.event_time.inprocess_play import SETTLE_S, line_job, play_lines
+from proving_ground.exercises.event_time.line import Line
+from proving_ground.exercises.event_time.radio_play import RadioPlay
 from proving_ground.exercises.exercise import Exercise
-from proving_ground.exercises.inprocess_play import SETTLE_S, line_job, play_lines
-from proving_ground.exercises.line import Line
-from proving_ground.exercises.radio_play import RadioPlay
-from proving_ground.exercises.result import Played, result_of
+from proving_ground.exercises.scoring.result import Played, result_of
+from proving_ground.exercises.scoring.statistics import mean_of
 from proving_ground.exercises.settings import with_settings
 from proving_ground.exercises.source import open_exercise
-from proving_ground.exercises.statistics import mean_of
 
 Settings = Mapping[str, Any]
 Figures = dict[str, float | None]

@@ -18,7 +18,7 @@ from bootprint.errors import BootprintError
 from bootprint.messages import ImuBatch
 from bootprint.topics import Identity
 from bootprint.zenoh_bus import EmbeddedRouter, open_bus
-from proving_ground.exercises.free_ports import free_ports
+from proving_ground.exercises.processes.free_ports import free_ports
 from proving_ground.performance.figures import Table
 
 _WHO: Final = Identity("benchmark", "benchmark", "benchmark")

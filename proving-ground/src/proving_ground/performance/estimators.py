@@ -2,12 +2,12 @@
 
 from typing import Final
 
-from proving_ground.evaluation.benchmark import measure as measure_foot
-from proving_ground.evaluation.benchmark import walk_of as foot_walk
-from proving_ground.evaluation.body_benchmark import measure_body
-from proving_ground.evaluation.body_benchmark import walk_of as body_walk
-from proving_ground.evaluation.hub_benchmark import hub_rows
+from proving_ground.performance.body_benchmark import measure_body
+from proving_ground.performance.body_benchmark import walk_of as body_walk
 from proving_ground.performance.figures import Table
+from proving_ground.performance.foot_benchmark import measure as measure_foot
+from proving_ground.performance.foot_benchmark import walk_of as foot_walk
+from proving_ground.performance.hub_benchmark import hub_rows
 
 _TURNS: Final = 3
 _HUB_SECONDS: Final = 20

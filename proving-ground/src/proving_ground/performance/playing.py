@@ -9,8 +9,8 @@ import psutil
 
 from bootprint.errors import BootprintError
 from bootprint.stopping import Stop
-from proving_ground.exercises.stage import Play, Stage
-from proving_ground.exercises.usage import UsageMeter, by_service
+from proving_ground.exercises.processes.stage import Play, Stage
+from proving_ground.exercises.processes.usage import UsageMeter, by_service
 from proving_ground.performance.figures import Table
 from proving_ground.performance.latencies import SAID_BY, Latencies
 from proving_ground.performance.walking_squads import walking_squads

@@ -9,8 +9,8 @@ from itertools import cycle, islice
 from pathlib import Path
 from typing import Final
 
-from proving_ground.exercises.emulated_radio import NetProfile
 from proving_ground.exercises.exercise import ORIGIN, Exercise, Hub, Net, Settings, Soldier
+from proving_ground.exercises.processes.emulated_radio import NetProfile
 from proving_ground.exercises.squad import COMMAND_POST, HUB_SETTINGS
 from proving_ground.simulation.walker import simulate_walk
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from proving_ground.exercises.emulated_radio import Air, NetProfile
+from proving_ground.exercises.processes.emulated_radio import Air, NetProfile
 from proving_ground.radio_load.load import NET, Load
 from sa_hub.radio.medium import Medium
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 from rich.console import Console
 from rich.table import Table
 
-from proving_ground.exercises.tables import cell, heading
+from proving_ground.exercises.reporting.tables import cell, heading
 
 _COLUMNS: Final = (
     "format",

@@ -9,9 +9,9 @@ import msgspec
 import numpy as np
 
 from bootprint.geodesy import azimuth_of
-from proving_ground.exercises.emulated_radio import NetProfile
 from proving_ground.exercises.exercise import Exercise, Fault, Hub, Net
 from proving_ground.exercises.exercise import Soldier as Instrumented
+from proving_ground.exercises.processes.emulated_radio import NetProfile
 from proving_ground.people import PersonMotion, move
 from proving_ground.scenario.cast import Soldier
 from proving_ground.scenario.loading import play

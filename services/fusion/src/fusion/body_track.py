@@ -14,37 +14,19 @@ by satellites take the memory of the way with them within ``memory_s``.
 
 import math
 from collections import Counter, deque
-from dataclasses import dataclass
 
 import numpy as np
 
 from bootprint.clock import NS_PER_S
-from bootprint.geodesy import wrap_angle
 from bootprint.messages import BodyStep, FootStep, GnssFix
 from fusion.boots import Boots
 from fusion.config import BodyConfig
 from fusion.lessons import Lessons
 from fusion.state import Array
+from fusion.wearing import Wearing, by_itself, kind
 
 _PENDING = 16  # steps that may have been made before silence was noticed
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])  # turns a vector to the left
-
-
-@dataclass(slots=True)
-class Learned:
-    """A number with its variance, learned from readings that each err by ``reading``; it wanders by ``wander``."""
-
-    value: float
-    variance: float
-    reading: float
-    wander: float
-
-    def hear(self, told: float) -> None:
-        """One more reading (a scalar Kalman filter)."""
-        self.variance += self.wander**2
-        gain = self.variance / (self.variance + self.reading**2)
-        self.value += gain * told
-        self.variance *= 1.0 - gain
 
 
 class BodyTrack:
@@ -54,12 +36,14 @@ class BodyTrack:
         self._config = config
         self._silence_ns = round(config.silence_s * NS_PER_S)
         self._counters = counters
-        self._turn = Learned(0.0, config.turn_sigma_rad**2, config.turn_reading_rad, config.turn_wander_rad)
-        self._scale = Learned(1.0, config.scale_sigma**2, config.scale_reading, config.scale_wander)
+        self._wearing = Wearing(config)
         self._pending: deque[BodyStep] = deque(maxlen=_PENDING)
         self._carried: list[tuple[int, Array]] = []  # what was carried since a foot last spoke
-        self._stretch: tuple[Array, Array] | None = None  # where boots were, what the body went since
-        self._way = np.zeros(2)  # since the last absolute place, as far as remembered
+        # Where boots were, what the body went since by steps of which kind.
+        self._stretch: tuple[Array, Array, str] | None = None
+        self._ways: dict[
+            str, Array
+        ] = {}  # by kind of step, since the last absolute place, as far as remembered
         self._lessons = Lessons()
         self._heard_ns: int | None = None
         self._last_sequence = -1
@@ -74,15 +58,16 @@ class BodyTrack:
         self._last_sequence = step.sequence
         self._heard_ns = max(self._heard_ns or step.time_ns, step.time_ns)
         self._pending.append(step)
-        taught = list(self._lessons.step(step, _led(step)))
+        self._wearing.meet(step)
+        taught = list(self._lessons.step(step))
         if not boots.in_enu or boots.reference is None:
             return
         if self._boots_speak(boots, step.time_ns):
             self._learn(boots, step)
             return
         self._stretch = None
-        for angle_rad, ratio in taught:
-            self._hear(angle_rad, ratio)
+        for lesson in taught:
+            self._wearing.hear(*lesson)
         if self._camera_speaks(boots, step.time_ns):
             self._pending.clear()  # it tells the same way
             return
@@ -125,69 +110,60 @@ class BodyTrack:
 
     def corrected(self, since_last_s: float) -> None:
         """Satellites have told a place: the way before it is forgotten little by little."""
-        self._way *= math.exp(-max(0.0, since_last_s) / self._config.memory_s)
+        kept = math.exp(-max(0.0, since_last_s) / self._config.memory_s)
+        self._ways = {of_kind: kept * way for of_kind, way in self._ways.items()}
 
     def placed(self) -> None:
         """A person has told a place."""
-        self._way[:] = 0.0
+        self._ways.clear()
 
     # --- a step as a move --------------------------------------------------------------------------------------
 
     def _moved(self, step: BodyStep) -> tuple[Array, Array]:
         """By how much it moves the body (3,) m, and the covariance (3, 3) that it adds."""
-        flat = self._flat(step)
-        before, after = self._shared(step, self._way), self._shared(step, self._way + flat)
-        self._way = self._way + flat
+        flat, of_kind = self._wearing.way(step), kind(step)
+        before = self._shared(step)
+        self._ways[of_kind] = self._ways.get(of_kind, np.zeros(2)) + flat
         own = (self._config.own_sigma * step.length_m) ** 2
         spread = np.zeros((3, 3))
-        spread[:2, :2] = _positive(after - before) + own * np.eye(2)
+        spread[:2, :2] = _positive(self._shared(step) - before) + own * np.eye(2)
         spread[2, 2] = own
         return np.append(flat, 0.0), spread
 
-    def _flat(self, step: BodyStep) -> Array:
-        yaw = 0.5 * math.pi - step.azimuth_rad + self._turn.value
-        length_m = self._scale.value * step.length_m
-        return length_m * np.array([math.cos(yaw), math.sin(yaw)])
-
-    def _shared(self, step: BodyStep, way: Array) -> Array:
-        """Covariance (2, 2) of a way whose azimuths and lengths err alike."""
-        learned_turn = self._turn.variance < self._config.turn_sigma_rad**2
-        turn = self._turn.variance + self._config.azimuth_sigma_rad**2
-        if not learned_turn:
-            turn = max(turn, step.azimuth_sigma_rad**2)
-        across = _QUARTER @ way
-        return self._scale.variance * np.outer(way, way) + turn * np.outer(across, across)
+    def _shared(self, step: BodyStep) -> Array:
+        """Covariance (2, 2) of the way: azimuths err alike, and lengths of steps of a kind."""
+        learned = self._wearing.turn_variance
+        least = step.azimuth_sigma_rad**2 if learned is None else 0.0
+        turn = max((learned or self._config.turn_sigma_rad**2) + self._config.azimuth_sigma_rad**2, least)
+        across = _QUARTER @ sum(self._ways.values(), np.zeros(2))
+        covariance: Array = turn * np.outer(across, across)
+        for of_kind, way in self._ways.items():
+            covariance = covariance + self._wearing.scale_variance(of_kind) * np.outer(way, way)
+        return covariance
 
     # --- learning ----------------------------------------------------------------------------------------------
 
     def _learn(self, boots: Boots, step: BodyStep) -> None:
-        """Compare a stretch by boots with the same by body, once it is long and straight."""
-        here = np.array(boots.track_point()[:2])
-        went = _led(step)
-        if self._stretch is None:
-            self._stretch = here, np.zeros(2)
+        """Compare a stretch by boots with the same by body, once it is long and straight, of steps of a kind."""
+        here, of_kind = np.array(boots.track_point()[:2]), kind(step)
+        if self._stretch is None or self._stretch[2] != of_kind:
+            self._stretch = here, np.zeros(2), of_kind
             return
-        begun, by_body = self._stretch[0], self._stretch[1] + went
-        self._stretch = begun, by_body
+        begun, by_body = self._stretch[0], self._stretch[1] + by_itself(step)
+        self._stretch = begun, by_body, of_kind
         by_boots = here - begun
         if float(np.hypot(*by_body)) < self._config.stretch_m:
             return
         self._stretch = None
         angle_rad = math.atan2(by_boots[1], by_boots[0]) - math.atan2(by_body[1], by_body[0])
-        self._hear(angle_rad, float(np.hypot(*by_boots) / np.hypot(*by_body)))
-
-    def _hear(self, angle_rad: float, ratio: float) -> None:
-        """How far the unit was turned, and how much longer its steps should have been, over a stretch."""
-        if 0.5 < ratio < 2.0:
-            self._turn.hear(wrap_angle(angle_rad - self._turn.value))
-            self._scale.hear(ratio - self._scale.value)
+        self._wearing.hear(of_kind, angle_rad, float(np.hypot(*by_boots) / np.hypot(*by_body)))
 
     # --- what is asked -----------------------------------------------------------------------------------------
 
     @property
     def turned(self) -> tuple[float, float]:
-        """The angle, counter-clockwise, from the unit's yaws to the boots', and its sigma, rad."""
-        return self._turn.value, math.sqrt(self._turn.variance)
+        """See `Wearing.turned`."""
+        return self._wearing.turned
 
     def drives(self, boots: Boots, now_ns: int) -> bool:
         """Whether the position moves by the body's steps alone."""
@@ -198,11 +174,6 @@ class BodyTrack:
             and not self._camera_speaks(boots, now_ns)
             and now_ns - self._heard_ns <= self._config.fresh_s * NS_PER_S
         )
-
-
-def _led(step: BodyStep) -> Array:
-    """Where a step led by itself, (2,) m, east and north."""
-    return step.length_m * np.array([math.sin(step.azimuth_rad), math.cos(step.azimuth_rad)])
 
 
 def _positive(matrix: Array) -> Array:

@@ -153,13 +153,16 @@ class Boots(Company):
         forgiven_s = (
             silence.coasting_s if step.realigned else silence.rejoin_s
         )  # a broken step tells no way at all
+        dark = foot.lay_dark(step, untracked_s)
         others = self.others(foot, step.time_ns)
-        if others and (untracked_s > forgiven_s or foot.strayed):
+        witnessed = dark is None or any(other.saw(dark) for other in others)
+        if others and (foot.strayed or (witnessed and untracked_s > forgiven_s)):
             self._drop(foot)
         elif untracked_s > silence.coasting_s and not others and self.company(foot, step.time_ns):
             self._leave_behind(foot, step.time_ns)
-        elif foot.active and untracked_s > 0.0:
-            self._unseen.own_up(foot, self.feet.values(), step, untracked_s, self.carried_ns)
+        elif foot.active and dark is not None:
+            feet = [foot] if witnessed else [one for one in self.feet.values() if one.carries]
+            self._unseen.own_up(foot, feet, dark, untracked_s, self.carried_ns)
 
     def _drop(self, foot: Foot) -> None:
         foot.active, foot.strayed, foot.joining, foot.own = False, False, None, np.zeros(4)
@@ -264,6 +267,19 @@ class Boots(Company):
             by = self.filter.state[foot.block.position] - before[foot.block.position]
             foot.trail.carry(by)
         return innovation
+
+    def beyond_tangent(
+        self, stands: Sequence[body.Stand], sigma_m: float, surest_rad: float = math.inf
+    ) -> Array | None:
+        """Where a doubtful heading may have led the body beside its tangent, (3, 3) m²: `Measurement.carries`.
+
+        None if that is less than who tells the place now errs, and the heading no more doubtful than
+        ``surest_rad``: then the tangent will do.
+        """
+        state, covariance = self.filter.state, self.filter.covariance
+        beside = body.unseen_by_tangent(state, covariance, stands)
+        will_do = math.sqrt(float(np.trace(beside))) <= sigma_m
+        return None if will_do and body.heading_sigma_rad(state, covariance, stands) <= surest_rad else beside
 
     def carry(self, by_m: Array, covariance: Array, until_ns: int | None = None) -> None:
         """The whole body has moved (3,) m without a step of these feet, give or take ``covariance`` (3, 3).

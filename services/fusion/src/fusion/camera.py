@@ -21,6 +21,7 @@ from fusion.feet import Foot
 from fusion.filter import Measurement
 from fusion.joining import Joining, relative_noise
 from fusion.models import body, camera, foot_step
+from fusion.models.turned import unturned
 from fusion.rooms.sight import Sight, sight_of
 from fusion.state import Array, FootBlock
 from fusion.taken_along import TakenAlong
@@ -198,7 +199,9 @@ class Camera:
             return
         uncarried_s = self.foot.uncarried_s(unseen_s, self._boots.carried_ns)
         drift, turn = silence.drift_m_s * uncarried_s, silence.turn_rad_sqrt_s
-        self._boots.filter.widen_together(drift**2 * np.eye(3), turn**2 * unseen_s)
+        together = [one.block for one in self._boots.everybody() if one.active]
+        self._boots.filter.widen_together(drift**2 * np.eye(3))
+        self._boots.filter.widen_turned(together, turn**2 * unseen_s)
 
     def _leave(self, foot: Foot) -> None:
         foot.active = False
@@ -265,9 +268,12 @@ class Camera:
         self._coupled_ns = time_ns
         stands = [(one.block, one.offset) for one in feet]
         state = self._boots.filter.state
+        here = body.position(state, stands)
         jacobian = -body.position_jacobian(state, stands)
         jacobian[:, foot.block.position] += np.eye(3)
-        place = body.position(state, stands) + self._boots.ahead(feet, time_ns)
+        away = state[foot.block.position] - here  # what is ahead of the feet turns with them too
+        jacobian = unturned(jacobian, away, body.heading_jacobian(state, stands))
+        place = here + self._boots.ahead(feet, time_ns)
         residual = place - state[foot.block.position]
         self._learn_tilt(place)
         settings = self._settings

@@ -230,9 +230,10 @@ class FusionConfig(Config, frozen=True):
     feet: Feet = ("left_foot", "right_foot")
     gnss_sources: tuple[str, ...] = ("gnss",)  # receivers waited for, within the window
     reorder_window_s: NonNegative = 0.3  # the longest wait for what is out of order
-    stance_delay_s: NonNegative = 0.1  # a FootStep is stamped at most this long before poses already sent
+    stance_delay_s: NonNegative = 0.0  # a FootStep is stamped so long before poses already sent: never
     rate_hz: Annotated[float, msgspec.Meta(ge=1.0, le=20.0)] = 5.0
-    lookahead_s: NonNegative = 0.1  # a published position lies between two foot poses, this far apart
+    # Poses are stamped by the first sample after a time of the grid, which is the positions' too.
+    lookahead_s: NonNegative = 0.05
     floor_height_m: Positive | None = None
     unplaced_sigma_m: Positive = 10_000.0  # an unplaced soldier is published at the origin, give or take this
     start: StartConfig | None = None

@@ -29,6 +29,9 @@ from fusion.state import Array
 
 GROUP = "peers"  # of places that err alike, for placing
 _POSE_SIGMA_M = 0.1  # of a body against its feet
+_SURE_RAD = (
+    0.35  # ranges through walls, believed whole, mend a heading that drifts, and would invent a lost one
+)
 _BEND_SHARE = 1.0  # of a line's own variance: bent more, a range is no line
 
 
@@ -136,6 +139,7 @@ class Cooperation:
                 np.array([[variance]]),
                 gate_probability=self._config.gate_probability,
                 entangled=True,
+                carries=boots.beyond_tangent(stands, math.sqrt(variance), _SURE_RAD),
             )
         )
         self._counters["ranges_taken" if found.accepted else "ranges_refused"] += 1
@@ -164,8 +168,10 @@ class Cooperation:
             self._counters["corrected_by_all_peers"] += 1
         elif np.trace(found.covariance) >= self._config.worth * np.trace(spread):
             return False
+        sigma_m = math.sqrt(0.5 * float(np.trace(found.covariance)))
+        carries = boots.beyond_tangent(stands, sigma_m, _SURE_RAD)
         jacobian = body.position_jacobian(boots.filter.state, stands)[:2]
-        boots.correct(Measurement("range", away, jacobian, found.covariance, entangled=True))
+        boots.correct(Measurement("range", away, jacobian, found.covariance, entangled=True, carries=carries))
         self._counters["located_by_ranges"] += 1
         return True
 
@@ -192,9 +198,8 @@ class Cooperation:
 
 def _believed(boots: Boots, stands: Sequence[body.Stand]) -> tuple[Array, Array]:
     """Where the boots say that the body is (3,) m, and how sure in the plane (2, 2) m²."""
-    state = boots.filter.state
-    jacobian = body.position_jacobian(state, stands)[:2]
-    spread: Array = jacobian @ boots.filter.covariance @ jacobian.T + _POSE_SIGMA_M**2 * np.eye(2)
+    state, covariance = boots.filter.state, boots.filter.covariance
+    spread: Array = body.position_covariance(state, covariance, stands)[:2, :2] + _POSE_SIGMA_M**2 * np.eye(2)
     return body.position(state, stands), spread
 
 

@@ -21,6 +21,7 @@ from fusion.feet import Foot
 from fusion.filter import Innovation, Measurement, StateFilter
 from fusion.models import dual_foot
 from fusion.models.dual_foot import Passing
+from fusion.models.turned import unturned
 from fusion.state import Array
 
 _CROSSWISE = ("left", "right")  # a step to the side passes nothing
@@ -90,10 +91,13 @@ class Coupling:
         return None
 
     def _same_position(self, passing: Passing) -> Measurement:
+        state = self._filter.state
+        apart, heading = dual_foot.difference(state, passing), np.zeros(state.size)
+        heading[passing.stepped.yaw] = 1.0
         return Measurement(
             "dual_foot",
-            -dual_foot.difference(self._filter.state, passing),
-            dual_foot.difference_jacobian(self._filter.state, passing),
+            -apart,
+            unturned(dual_foot.difference_jacobian(state, passing), apart, heading),
             self._boots.same_position_sigma_m**2 * np.eye(3),
             gate_probability=self._boots.gate_probability,
             relative=True,

@@ -9,9 +9,10 @@ What comes too late to be put in order follows one rule a kind, and is counted:
 
 A **Track** is of another's time and says how old it is: it is taken as it comes, past the order of the own inputs.
 
-A position at t is published when everything up to t + ``lookahead_s`` has been taken in, so that it lies between
-two foot poses instead of up to a tenth of a second behind. So it depends on the messages alone, not on when ticks
-come. A ``patient`` core (replay as fast as possible) waits for everybody, whatever ticks say, to its close.
+A position at t is published when everything up to t + ``lookahead_s`` has been taken in, so that it knows the foot
+poses of that time instead of being up to a tenth of a second behind. So it depends on the messages alone, not on
+when ticks come. A ``patient`` core (replay as fast as possible) waits for everybody, whatever ticks say, to its
+close.
 """
 
 from collections import Counter
@@ -59,6 +60,9 @@ SUBJECTS = (
     "track",
 )  # at one time in this order: a step before its own poses
 SOURCE = "fusion"
+_STEADY = frozenset(
+    {"gnss", "camera_motion", "pressure"}
+)  # they keep a rhythm, and come too late if not waited for
 _LONGEST_LEAP_NS = 60 * NS_PER_S  # after a longer hole in time the positions between are not made up
 
 
@@ -323,4 +327,5 @@ def _buffer(config: FusionConfig, patient: bool) -> ReorderBuffer:
     if patient:
         return ReorderBuffer(ReplayPulse(feet), expected, capacity=None)
     window_ns = round(config.reorder_window_s * NS_PER_S)
-    return ReorderBuffer(LivePulse(feet, window_ns, round(config.silence.patience_s * NS_PER_S)), expected)
+    pulse = LivePulse(feet, window_ns, round(config.silence.patience_s * NS_PER_S))
+    return ReorderBuffer(pulse, expected, is_steady=lambda source: source.split("/")[1] in _STEADY)

@@ -18,8 +18,12 @@ COARSE_STEP = np.diag([0.1, 0.1, 0.1, 0.05]) ** 2  # for a step that states no c
 _SAME_STANCE_NS = 300_000_000  # a pose so long before a step's start is of the same stance
 _POOR, _GOOD = 0.2, 0.5  # mean quality of recent strides
 _RECENT = 6  # strides by which a foot is judged
+_PAUSE_NS = 400_000_000  # without a word of who speaks ten times a second: the stream may have broken
+_SHORT_HOLE = 0.25  # of a time that somebody else was in the dark
 _GAP_S = 1.0  # between one step's end and the next one's start: more is time nobody saw
 _LONGEST_GAP_S = 60.0  # after this nothing is known anyway
+
+Span = tuple[int, int]  # UTC ns from, until
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +120,7 @@ class Foot:
     stepped: bool = False  # since the feet were last coupled
     recent: deque[Stride] = field(default_factory=lambda: deque(maxlen=_RECENT))
     trail: Trail = field(default_factory=Trail)
+    dark: Span | None = None  # the newest time of which its track does not tell, as far as is known
 
     @property
     def place(self) -> str:
@@ -145,6 +150,29 @@ class Foot:
     def is_ahead(self, time_ns: int, by_s: float) -> bool:
         """Whether this foot has been heard more than ``by_s`` after that time."""
         return self.heard_ns is not None and self.heard_ns - time_ns > by_s * NS_PER_S
+
+    def lay_dark(self, step: FootStep, untracked_s: float) -> Span | None:
+        """Remember in which time lies what went unobserved up to the end of ``step``; None if nothing did.
+
+        A step whose stream held tells its time, though poses may have paused meanwhile.
+        """
+        if untracked_s > 0.0:
+            since_ns = step.start_time_ns if self.end_ns is None else min(self.end_ns, step.start_time_ns)
+            self.dark = since_ns, step.time_ns if step.realigned else step.start_time_ns
+            return self.dark
+        if self.dark is not None and step.start_time_ns <= self.dark[0]:
+            self.dark = (step.time_ns, self.dark[1]) if step.time_ns < self.dark[1] else None
+        return None
+
+    def saw(self, span: Span) -> bool:
+        """Whether its track tells of that time, but for a hole that is short beside it.
+
+        Poses that go on after a pause may be of a stream that broke: that shows in the next step.
+        """
+        if self.dark is None:
+            return True
+        missed_ns = min(self.dark[1], span[1]) - max(self.dark[0], span[0])
+        return missed_ns <= 0 or missed_ns < _SHORT_HOLE * (span[1] - span[0])
 
     def untracked_s(self, step: FootStep, unseen: int) -> float:
         """How long this foot went unobserved up to the end of ``step``; half a second an unseen step at least.
@@ -193,6 +221,8 @@ class Foot:
 
     def note_pose(self, pose: FootPose) -> bool:
         """Take where the foot is since its last step; False if the pose belongs to another step."""
+        if self.heard_ns is not None and pose.time_ns - self.heard_ns > _PAUSE_NS:
+            self.dark = self.heard_ns, pose.time_ns
         self.hear(pose.time_ns)
         if self.ledger.last is None or pose.step_sequence != self.ledger.last:
             return False
@@ -207,4 +237,5 @@ class Foot:
         """The clock has been set: what was remembered by the old one."""
         self.end_ns = None if self.end_ns is None else self.end_ns + by_ns
         self.heard_ns = None if self.heard_ns is None else self.heard_ns + by_ns
+        self.dark = None if self.dark is None else (self.dark[0] + by_ns, self.dark[1] + by_ns)
         self.trail.shift(by_ns)

@@ -15,6 +15,7 @@ from bootprint.messages import FootStep, Vector3
 from fusion.chi_square import chi_square_quantile
 from fusion.models import foot_step
 from fusion.models.shared_errors import Shares
+from fusion.models.turned import chord_of
 from fusion.state import FOOT_SIZE, Array, FootBlock, Layout
 from fusion.tape import Change, ChangeKind, Tape
 from fusion.transform import RigidTransform
@@ -43,6 +44,10 @@ class Measurement:
     optimum between two scalars is the surer of them: Julier and Uhlmann 1997.)
 
     ``relative``: it compares walkers with each other, and would be the same had all been turned and moved together.
+    ``directs``: it tells a heading alone, so what it does to positions is to turn them about where that was sure.
+    ``carries`` (3, 3) m²: where a doubtful heading may have led the body, beside its tangent. The measurement moves
+    all walkers alike then and corrects nothing else: its linearisation is worth nothing for the heading, which
+    stays as it is and as doubtful (Schmidt's consider filter).
     """
 
     source: str
@@ -53,6 +58,8 @@ class Measurement:
     gate_probability: float | None = None
     entangled: bool = False
     relative: bool = False
+    directs: bool = False
+    carries: Array | None = None
 
 
 def invert_spd(matrix: Array) -> Array:
@@ -60,6 +67,11 @@ def invert_spd(matrix: Array) -> Array:
     root = np.linalg.inv(np.linalg.cholesky(matrix))
     result: Array = root.T @ root
     return result
+
+
+def _quarter_turn(way: Array) -> Vector3:
+    """How a way (3,) m answers to a turn about the vertical, m/rad."""
+    return -float(way[1]), float(way[0]), 0.0
 
 
 class StateFilter:
@@ -136,12 +148,13 @@ class StateFilter:
         self._settle()
         return np.asarray(moved)
 
-    def displace(self, blocks: Sequence[FootBlock], by: Array) -> None:
-        """Put these elsewhere, by (4,), as sure as they were."""
-        state = self.state.copy()
+    def displace(self, blocks: Sequence[FootBlock], by: Array, led_by: FootBlock) -> None:
+        """Put these elsewhere, by (4,) that another led them: as sure as they were, but for the leader's yaw."""
+        state, turning = self.state.copy(), np.eye(self.layout.size)
         for block in blocks:
             state[block.all] += by
-        self._advance(state, np.eye(self.layout.size), np.zeros_like(self.covariance))
+            turning[block.position, led_by.yaw] += _quarter_turn(by)
+        self._advance(state, turning, np.zeros_like(self.covariance))
         self._settle()
 
     def _advance(self, state: Array, transition: Array, process: Array, kind: ChangeKind = "carry") -> None:
@@ -154,6 +167,8 @@ class StateFilter:
         """Gate, then update; the innovation tells what happened."""
         innovation = self._innovation(measurement)
         if innovation.accepted:
+            if measurement.carries is not None:
+                self.widen_together(measurement.carries)
             self._correct(measurement)
             self._settle()
         return innovation
@@ -163,12 +178,30 @@ class StateFilter:
         jacobian, noise = measurement.jacobian, measurement.noise
         shared = self.covariance @ jacobian.T
         gain = shared @ invert_spd(jacobian @ shared + (0.0 if measurement.entangled else 1.0) * noise)
+        if measurement.carries is not None:
+            gain = self._alike(gain, jacobian)
         kept = np.eye(self.layout.size) - gain @ jacobian
         correction = gain @ measurement.residual
+        if measurement.directs:
+            self._bend(correction)
         self.state = self.state + correction
         self.covariance = kept @ self.covariance @ kept.T + gain @ noise @ gain.T
-        if measurement.relative:
+        if measurement.relative or measurement.directs:
             self._turn_along(correction)
+
+    def _alike(self, gain: Array, jacobian: Array) -> Array:
+        """A gain by which all walkers move as those measured would in the mean, and nothing else changes."""
+        walkers = self.layout.walkers
+        measured = [block for block in walkers if jacobian[:, block.position].any()] or walkers
+        alike = np.zeros_like(gain)
+        for block in walkers:
+            alike[block.position] = np.mean([gain[one.position] for one in measured], axis=0)
+        return alike
+
+    def _bend(self, correction: Array) -> None:
+        """Along the arc, not along its tangent: ``δp ← V(δψ) δp``, the exponential of a planar motion."""
+        for block in self.layout.walkers:
+            correction[block.position] = chord_of(float(correction[block.yaw])) @ correction[block.position]
 
     def _turn_along(self, correction: Array) -> None:
         """What nobody has measured stays as unknown as it was, though positions have been corrected.
@@ -181,13 +214,15 @@ class StateFilter:
         """
         turning = np.eye(self.layout.size)
         for block in self.layout.walkers:
-            east, north, _ = correction[block.position]
-            turning[block.position, block.yaw] = (-north, east, 0.0)
+            turning[block.position, block.yaw] = _quarter_turn(correction[block.position])
         self._advance(self.state, turning, np.zeros_like(self.covariance))
 
     def _innovation(self, measurement: Measurement) -> Innovation:
         noise = measurement.noise if measurement.gate_noise is None else measurement.gate_noise
-        covariance = measurement.jacobian @ self.covariance @ measurement.jacobian.T + noise
+        prior = self.covariance
+        if measurement.carries is not None:
+            prior = prior + self._common(measurement.carries, 0.0)
+        covariance = measurement.jacobian @ prior @ measurement.jacobian.T + noise
         squared = float(measurement.residual @ invert_spd(covariance) @ measurement.residual)
         probability = measurement.gate_probability
         degrees = measurement.residual.size
@@ -208,12 +243,17 @@ class StateFilter:
 
     def widen_together(self, position_covariance: Array, yaw_rad2: float = 0.0) -> None:
         """Add covariance (3, 3), m², and a yaw variance to all feet alike: the whole body was misjudged."""
+        common = self._common(position_covariance, yaw_rad2)
+        self._advance(self.state, np.eye(self.layout.size), common)
+
+    def _common(self, position_covariance: Array, yaw_rad2: float) -> Array:
+        """Covariance (n, n) of what is common to all who walk."""
         process = np.zeros_like(self.covariance)
         for one in self.layout.walkers:
             for other in self.layout.walkers:
                 process[one.position, other.position] = position_covariance
                 process[one.yaw, other.yaw] = yaw_rad2
-        self._advance(self.state, np.eye(self.layout.size), process)
+        return process
 
     def carry(self, by_m: Array, covariance: Array) -> None:
         """Move all feet alike by (3,) m, give or take ``covariance`` (3, 3)."""
@@ -236,12 +276,15 @@ class StateFilter:
     def join(self, block: FootBlock, beside: FootBlock, pose: Array, noise: Array, alike: bool) -> None:
         """Set a foot to ``pose`` (4,), found relative to the foot ``beside`` it, give or take ``noise`` (4, 4).
 
-        State augmentation: the new foot shares every error of the foot it was compared with. Where both set off
-        ``alike``, the difference between them is as much the fault of the one as of the other: each gets half of
-        it, with opposite shares, and it is their mean that keeps the covariance of the foot that was here first.
+        State augmentation: the new foot shares every error of the foot it was compared with, and turns with it.
+        Where both set off ``alike``, the difference between them is as much the fault of the one as of the other:
+        each gets half of it, with opposite shares, and it is their mean that keeps the covariance of the foot that
+        was here first.
         """
         transition, process = np.eye(self.layout.size), np.zeros_like(self.covariance)
         transition[block.all] = transition[beside.all]
+        away = pose[:3] - self.state[beside.position]
+        transition[block.position, beside.yaw] += _quarter_turn(away)
         process[block.all, block.all] = noise
         if alike:
             for one, other in ((block, block), (beside, beside), (block, beside), (beside, block)):

@@ -3,7 +3,7 @@
 from bootprint.remembering import Memory, RememberingPart, recall
 from bootprint.rooms import RoomMap
 from bootprint.saved_state import StateFile
-from bootprint.service import PROMPT_BEAT_S, Context, CorePart, Part, Service
+from bootprint.service import Context, CorePart, Part, Service
 from fusion.config import FusionConfig
 from fusion.engine import SUBJECTS, FusionCore
 from fusion.memory import FILE, FORM, SAVE_EVERY_NS, kept_of, understood
@@ -41,7 +41,7 @@ SERVICE = Service(
     summary="Both boots and satellites into one position that knows how wrong it may be.",
     subjects=(*SUBJECTS, "rooms"),
     build=build,
-    beat_s=PROMPT_BEAT_S,
+    ringing=("foot_pose",),  # positions come with them
 )
 
 

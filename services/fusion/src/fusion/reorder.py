@@ -4,7 +4,8 @@ Time is driven by the *drivers* (the feet): an input waits until nothing earlier
 when either
 
 - every *expected* source has gone past it. A source's watermark is the stamp of its last message without a hole in
-  the sequence before it, so a message that overtook another does not move it; or
+  the sequence before it, so a message that overtook another does not move it. *Steady* sources (receivers, cameras)
+  are expected as soon as they keep a rhythm, at their next turn and not before, until they have missed two; or
 - the `Pulse` says that nobody is waited for any longer: the newest stamp of a driver is ``window`` later, or the
   drivers have been silent for longer than the ``patience``: then it is the window behind the present that counts,
   until one of them speaks again. (In a replay as fast as possible it never says so.)
@@ -15,12 +16,13 @@ cannot be true carry nobody along (`fusion.pulse`).
 """
 
 import heapq
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 
 from bootprint.messages import Message
 from fusion.pulse import JUMP_NS, NEVER, Pulse, Verdict
+from fusion.rhythm import Rhythm
 
 _Key = tuple[int, str, int]
 _LATEST_NS = 1 << 62  # in the year 2116; times must have room to be calculated with
@@ -65,6 +67,7 @@ class _Source:
     reached_ns: int = NEVER
     overtaking: dict[int, int] = field(default_factory=dict)  # sequence -> time, behind a hole
     promised: Promise | None = None
+    rhythm: Rhythm | None = None  # of a steady one
 
     def take(self, sequence: int, time_ns: int) -> None:
         """A message has arrived."""
@@ -85,12 +88,22 @@ class _Source:
     def _reach(self, sequence: int, time_ns: int) -> None:
         self.next_sequence = sequence + 1
         self.reached_ns = max(self.reached_ns, time_ns)
+        if self.rhythm is not None:
+            self.rhythm.hear(time_ns)
 
     def give_up(self, sequence: int, time_ns: int) -> None:
         """This message was released although others before it are missing."""
         if sequence >= self.next_sequence:
             self.overtaking = {late: time for late, time in self.overtaking.items() if late > sequence}
             self.pass_by(sequence, time_ns)
+
+    def watermark_ns(self, from_ns: int, now_ns: int) -> int | None:
+        """Before this comes nothing more; None if it is not waited for, by what it has said ``from_ns`` to now."""
+        if self.rhythm is None:
+            return self.reached_ns
+        if self.rhythm.is_over(now_ns - max(self.reached_ns, from_ns)):
+            return None
+        return self.reached_ns + self.rhythm.rest_ns
 
     def keep_promise(self) -> None:
         """Move the watermark as promised, once the promised message is here."""
@@ -102,9 +115,17 @@ class _Source:
 class ReorderBuffer:
     """Holds messages back until their order is sure, for a bounded stretch of event time."""
 
-    def __init__(self, pulse: Pulse, expected: frozenset[str], capacity: int | None = 4096) -> None:
+    def __init__(
+        self,
+        pulse: Pulse,
+        expected: frozenset[str],
+        capacity: int | None = 4096,
+        is_steady: Callable[[str], bool] = lambda _: False,
+    ) -> None:
         self._pulse = pulse
         self._expected = expected
+        self._is_steady = is_steady
+        self._begun_ns = NEVER  # when a driver was first heard
         self._capacity = capacity
         self._heap: list[tuple[int, str, int, Message]] = []
         self._keys: set[_Key] = set()
@@ -176,7 +197,9 @@ class ReorderBuffer:
         self._keys -= keys
 
     def _source(self, name: str) -> _Source:
-        return self._sources.setdefault(name, _Source())
+        if name not in self._sources:
+            self._sources[name] = _Source(rhythm=Rhythm() if self._is_steady(name) else None)
+        return self._sources[name]
 
     def _listen(self, source: str, message: Message, arrival: Arrival) -> None:
         state = self._source(source)
@@ -219,6 +242,7 @@ class ReorderBuffer:
     def restart(self, time_ns: int) -> int:
         """Follow the drivers' clock back to ``time_ns``; by how much it was set (negative), ns."""
         self.set_back_ns = None
+        self._begun_ns = NEVER
         self._sources.clear()  # their watermarks are of the old time, and so is what is far ahead now
         self._drop({key for key in self._keys if key[0] > time_ns + JUMP_NS})
         self.low_ns = NEVER
@@ -230,5 +254,16 @@ class ReorderBuffer:
         """Move the line before which everything is sure; it goes back in `restart` only."""
         bound = self._pulse.sure_before_ns()
         if self._expected:
-            bound = max(bound, min(self._source(name).reached_ns for name in self._expected))
+            bound = max(bound, min(self._watermarks_ns(), default=bound))
         self.low_ns = max(self.low_ns, bound)
+
+    def _watermarks_ns(self) -> Iterator[int]:
+        """Of all who are waited for."""
+        now_ns = self._pulse.driven_ns
+        if self._begun_ns == NEVER:
+            self._begun_ns = now_ns
+        kept = {name for name, state in self._sources.items() if state.rhythm and state.rhythm.is_kept}
+        for name in self._expected | kept:
+            watermark_ns = self._source(name).watermark_ns(self._begun_ns, now_ns)
+            if watermark_ns is not None:
+                yield watermark_ns

@@ -126,7 +126,8 @@ class SatelliteAid:
         here = body.position(boots.filter.state, boots.stands(position.time_ns))[:2]
         inflation = gnss.correlation_inflation(position.since_s, receiver.moved_m(here), self._gnss)
         noise = gnss.noise(position.sigma_m, None)
-        innovation = self._correct_axes(boots, position, slice(0, 2), noise, inflation)
+        beyond = boots.beyond_tangent(boots.stands(position.time_ns), position.sigma_m)
+        innovation = self._correct_axes(boots, position, slice(0, 2), noise, inflation, carries=beyond)
         self._satellites.judge(position, innovation)
         if innovation.accepted:
             receiver.heard_at = here
@@ -136,7 +137,14 @@ class SatelliteAid:
             self._counters["gnss_height_rejected"] += not height.accepted
 
     def _correct_axes(
-        self, boots: Boots, position: SatellitePosition, axes: slice, noise: Array, inflation: float
+        self,
+        boots: Boots,
+        position: SatellitePosition,
+        axes: slice,
+        noise: Array,
+        inflation: float,
+        *,
+        carries: Array | None = None,
     ) -> Innovation:
         stands = boots.stands(position.time_ns)
         state = boots.filter.state
@@ -148,5 +156,6 @@ class SatelliteAid:
                 noise * inflation,
                 gate_noise=noise,
                 gate_probability=self._gnss.gate_probability,
+                carries=carries,
             )
         )

@@ -39,7 +39,7 @@ class TakenAlong:
             self._leads = True
             boots.filter.lead(leader.block, step, noise, ())
             moved = _since(leader, boots.feet_heard_ns)
-            boots.filter.displace(blocks, moved)
+            boots.filter.displace(blocks, moved, leader.block)
         boots.carried_ns = max(boots.carried_ns or step.time_ns, step.time_ns)
         for foot in silent:
             foot.trail.carry(moved[:3])
@@ -88,7 +88,8 @@ class TakenAlong:
 
 
 def _put(boots: Boots, foot: Foot, by: Array) -> None:
-    boots.filter.displace([foot.block], by)
+    leader = boots.stand_in or foot
+    boots.filter.displace([foot.block], by, leader.block)
     foot.trail.carry(by[:3])
 
 

@@ -33,4 +33,4 @@ def turn(boots: Boots, hint: HeadingHint) -> None:
     jacobian[0, foot.block.yaw] = 1.0
     boots.filter.widen_together(np.zeros((3, 3)), hint.turn_rad**2)
     noise = np.array([[hint.turn_sigma_rad**2]])
-    boots.correct(Measurement("azimuth", np.array([hint.turn_rad]), jacobian, noise))
+    boots.correct(Measurement("azimuth", np.array([hint.turn_rad]), jacobian, noise, directs=True))

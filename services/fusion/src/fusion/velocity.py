@@ -156,6 +156,7 @@ def hold_heading(boots: Boots, way: Way, config: VelocityConfig, counters: Count
             config.repeats * noise,
             gate_noise=noise,
             gate_probability=config.gate_probability,
+            directs=True,
         )
     )
     counters["courses_accepted" if found.accepted else "courses_rejected"] += 1

@@ -4,7 +4,7 @@ import msgspec
 
 from bootprint.remembering import Memory, recall
 from bootprint.saved_state import StateFile
-from bootprint.service import PROMPT_BEAT_S, Context, Part, Service
+from bootprint.service import Context, Part, Service
 from pdr_engine.config import PdrConfig
 from pdr_engine.engine import BODY, SUBJECTS, EngineCore
 from pdr_engine.foot import warm_up
@@ -48,7 +48,7 @@ SERVICE = Service(
     summary="Dead reckoning of boots and body: inertial samples in, steps out.",
     subjects=SUBJECTS,
     build=build,
-    beat_s=PROMPT_BEAT_S,
+    ringing=("imu",),
 )
 
 

@@ -156,6 +156,8 @@ class Trunk:
             planimetry_redundancy_pct=reliability.planimetry_pct,
             altimetry_redundancy_pct=reliability.altimetry_pct,
             external_reliability_m=reliability.external_m,
+            taught_scale=step.taught_scale,
+            taught_turn_rad=step.taught_turn_rad,
         )
 
     def _true(self, magnetic_rad: float) -> float:

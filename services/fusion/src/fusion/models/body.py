@@ -4,13 +4,14 @@
 end heading (zero in stance).
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from bootprint.messages import Vector3
 from fusion.models.foot_step import rotate, yaw_derivative
-from fusion.models.turned import on_the_arc
+from fusion.models.turned import beside_the_tangent, on_the_arc
 from fusion.state import Array, FootBlock
 
 Stand = tuple[FootBlock, Vector3]  # a foot, and how far it is from its last stance
@@ -50,7 +51,22 @@ def heading_jacobian(state: Array, stands: Sequence[Stand]) -> Array:
 
 def position_covariance(state: Array, covariance: Array, stands: Sequence[Stand]) -> Array:
     """Of the position (3, 3), m², with a doubtful heading's share bent to the arc it is."""
-    jacobian, heading = position_jacobian(state, stands), heading_jacobian(state, stands)
+    jacobian = position_jacobian(state, stands)
+    return on_the_arc(jacobian @ covariance @ jacobian.T, *_by_heading(state, covariance, stands))
+
+
+def unseen_by_tangent(state: Array, covariance: Array, stands: Sequence[Stand]) -> Array:
+    """The part of the position's covariance (3, 3), m², that is the arc's alone."""
+    return beside_the_tangent(*_by_heading(state, covariance, stands))
+
+
+def heading_sigma_rad(state: Array, covariance: Array, stands: Sequence[Stand]) -> float:
+    """How doubtful it is how the body is turned."""
+    return math.sqrt(max(0.0, _by_heading(state, covariance, stands)[1]))
+
+
+def _by_heading(state: Array, covariance: Array, stands: Sequence[Stand]) -> tuple[Array, float]:
+    """How the position errs with the body's yaw (3,), m·rad, and the yaw's variance, rad²."""
+    heading = heading_jacobian(state, stands)
     with_yaw = covariance @ heading
-    linear = jacobian @ covariance @ jacobian.T
-    return on_the_arc(linear, jacobian @ with_yaw, float(heading @ with_yaw))
+    return position_jacobian(state, stands) @ with_yaw, float(heading @ with_yaw)

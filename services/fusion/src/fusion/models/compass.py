@@ -37,6 +37,7 @@ def measurement(
         jacobian,
         np.array([[(1.0 - _LASTING) * step.magnetic_azimuth_sigma_rad**2]]),
         gate_probability=gate_probability,
+        directs=True,
     )
 
 

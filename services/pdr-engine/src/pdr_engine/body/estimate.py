@@ -27,6 +27,9 @@ class BodyStepEstimate:
 
     Where steps before turned out to have gone elsewhere, or the way back is laid on the way out, length and azimuth
     hold the correction: steps added up lead where the person is. ``settled``: how one of them went, as seen now.
+
+    ``taught_scale`` and ``taught_turn_rad`` (clockwise) are what satellites have taught of the person's length of
+    such steps and of how the unit sits; they are in length and azimuth.
     """
 
     start_ns: int
@@ -52,4 +55,6 @@ class BodyStepEstimate:
     disturbed: bool
     gait: Gait
     turn_rate_rad_s: float
+    taught_scale: float
+    taught_turn_rad: float
     stride: Stride

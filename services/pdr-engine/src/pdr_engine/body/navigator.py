@@ -9,7 +9,7 @@ import math
 from itertools import repeat
 
 from bootprint.geomagnetism import EarthField
-from bootprint.messages import Direction, Float64Array, Int64Array
+from bootprint.messages import Direction, Float64Array, Int64Array, MotionClass
 from pdr_engine.body.altitude.heights import Height, Heights
 from pdr_engine.body.altitude.stairways import Stairways
 from pdr_engine.body.azimuth.ahead import Ahead
@@ -252,6 +252,8 @@ class BodyNavigator:
             disturbed=disturbed,
             gait=cut.gait,
             turn_rate_rad_s=cut.turn_rate_rad_s,
+            taught_scale=self._personal.factor,
+            taught_turn_rad=self._misalignment.angle_rad,
             stride=stride,
         )
 
@@ -283,19 +285,16 @@ class BodyNavigator:
             movement.motion == "stairs", None if height is None else height.height_m
         )
 
+        motion = "walking" if movement.motion == "stairs" and on_stairs < 0.5 else movement.motion
+
         def length_m(direction: Direction) -> float:
-            motion = movement.motion
-            if motion == "stairs" and on_stairs < 0.5:
-                motion = "walking"
-            level = self._lengths.length(cut.gait, cut.turn_rate_rad_s, motion, direction)
-            slope = 0.0 if height is None else height.slope_rad(level / cut.gait.interval_s)
-            own_model = motion if direction in ("forward", "backward") else "unknown"
-            self._personal.meet(self._lengths.features(cut.gait, slope), own_model)
-            return self._personal.factor * projected(self._lengths.on_slope(level, cut.gait, slope), slope)
+            level_m, slope_rad = self._meet(cut, motion, direction, height)
+            along_m = self._lengths.on_slope(level_m, cut.gait, slope_rad)
+            return self._personal.factor * projected(along_m, slope_rad)
 
         told_rad = bearing.track.azimuth_rad - self._ahead.angle_rad
         length, azimuth = self._feet.go(movement, told_rad, length_m)
-        length_m(movement.direction)  # the one that fixes are to judge
+        self._meet(cut, motion, movement.direction, height)  # the one that fixes are to judge
         self._steps += 1
         self._personal.walk(length, azimuth)
         self._misalignment.walk(length, azimuth)
@@ -307,3 +306,13 @@ class BodyNavigator:
         if self._bearings.repeated is not None:
             self._bearings.repeated.walk(length, azimuth)
         return length, azimuth + turn_rad
+
+    def _meet(
+        self, cut: Cut, motion: MotionClass, direction: Direction, height: Height | None
+    ) -> tuple[float, float]:
+        """Go on to a step with the person's factor on such steps; its length on the level, m, and slope, rad."""
+        level_m = self._lengths.length(cut.gait, cut.turn_rate_rad_s, motion, direction)
+        slope_rad = 0.0 if height is None else height.slope_rad(level_m / cut.gait.interval_s)
+        own_model = motion if direction in ("forward", "backward") else "unknown"
+        self._personal.meet(self._lengths.features(cut.gait, slope_rad), own_model)
+        return level_m, slope_rad

@@ -13,7 +13,9 @@ FLAT = 0.005  # values on a plateau differ by less than this part of them
 SHOULDER = 0.03  # a plateau's rounded ends lie within this part of it
 APART_NS = 4_000_000  # values that are compared lie at least this far apart, whatever the rate
 RISE = 0.02  # a peak is cut off if its flanks point this part above it
-HIGHEST = 0.5  # and no flank lifts a peak by more than this part
+# No flank lifts a peak by more than this part, and the nearer to it the less: in the mean of some 16 000 recorded
+# peaks that were cut off afterwards.
+HIGHEST, BEND = 0.8, 1.5
 SAME = 0.003  # forces within this part of the largest are as high
 HITS = 4  # so many of them are a limit
 
@@ -104,8 +106,13 @@ def _height(flanks: Flanks, level: float) -> float:
 
 @compiled
 def _tamed(flanks: Flanks, level: float) -> Flanks:
-    """The flanks, less steep where they would make the peak too high."""
-    scale = min(1.0, HIGHEST / max(_height(flanks, level), RISE))
+    """The flanks, less steep the higher they point: peaks are rounder than flanks promise.
+
+    A promised rise by ``h`` of the level becomes ``h/(1 + (h/HIGHEST)^BEND)^(1/BEND)`` of it: small ones stay, and
+    none is higher than ``HIGHEST``.
+    """
+    rise = max(_height(flanks, level), 0.0)
+    scale = (1.0 + (rise / HIGHEST) ** BEND) ** (-1.0 / BEND)
     return flanks[0], flanks[1], scale * flanks[2], flanks[3], flanks[4], scale * flanks[5]
 
 

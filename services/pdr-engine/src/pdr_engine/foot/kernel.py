@@ -13,6 +13,7 @@ from pdr_engine.foot.compiled import Record, compiled
 from pdr_engine.foot.gap import doubt_gap
 from pdr_engine.foot.memory import ATTITUDE, HEADING, LEVER, MASK, POSITION, STATES, VELOCITY
 from pdr_engine.foot.quaternion import assign, from_rotation_vector, multiply, normalised, rotate
+from pdr_engine.foot.strides import vertical
 
 UPDATE_INTERVAL_S = 0.005  # the zero-velocity sigma is that of one update at this interval
 # Errors of interpolated samples, as parts of the force (less gravity) and of the rate.
@@ -87,9 +88,7 @@ def propagate(s: Record, p: Record, at: int, dt: float, gap: bool) -> None:
         P[LEVER + axis, LEVER + axis] += p.lever_walk**2 * dt
         if s.clipped[at & MASK, axis]:
             rebuilt = REBUILT * s.rebuilt[at & MASK, axis]
-            variance = (p.clip_noise**2 + rebuilt**2 * PEAK_S) * dt
-            _doubt_axis(s, ATTITUDE, axis, variance)
-            s.cut_angle += variance
+            _doubt_cut(s, axis, (p.clip_noise**2 + rebuilt**2 * PEAK_S) * dt)
         if s.cut_force[at & MASK, axis]:
             _doubt_axis(s, VELOCITY, axis, (p.cut_force * dt) ** 2)
 
@@ -126,6 +125,14 @@ def _doubt_axis(s: Record, block: int, axis: int, variance: float) -> None:
     for i in range(3):
         for j in range(3):
             s.P[block + i, block + j] += u[i] * u[j] * variance
+
+
+@compiled
+def _doubt_cut(s: Record, axis: int, variance: float) -> None:
+    """A sample of a cut peak: its axis is doubted, and the step remembers how far, and how much of it is a turn."""
+    _doubt_axis(s, ATTITUDE, axis, variance)
+    s.cut_angle += variance
+    s.cut_turn += vertical(s)[axis] ** 2 * variance
 
 
 @compiled

@@ -129,6 +129,7 @@ STATE = np.dtype(
         ("peak_rate", "f8"),  # squares, in the step's swing: (rad/s)², (m/s²)²
         ("peak_force", "f8"),
         ("cut_angle", "f8"),  # variance of what the gyro's cut peaks may have taken along in it, rad²
+        ("cut_turn", "f8"),  # ... of that about the vertical
         # how this foot usually is (`motion`)
         ("upright", "f8", 3),  # the vertical in sensor axes when it stands flat
         ("last_up", "f8", 3),  # the same in the stance before
@@ -211,6 +212,7 @@ STEP = np.dtype(
         ("peak_rate_rad_s", "f8"),
         ("peak_force_m_s2", "f8"),
         ("cut_rad", "f8"),  # 1 sigma of the angle that the gyro's cut peaks may have taken along
+        ("cut_turn_rad", "f8"),  # ... of that about the vertical
         ("quality_pct", "f8"),
         # 1 sigma of what all steps share: of the length, of the ground's slope, a turn
         ("common_scale", "f8"),

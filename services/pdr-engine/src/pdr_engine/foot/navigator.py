@@ -143,7 +143,7 @@ class FootNavigator:
         """Whether the sensors do not fit together: one stance in ten, of ten at least, begins seven sigmas off.
 
         Left-handed axes and wrong units do that; of the recorded walks none does, whatever fault is put into it
-        (`proving_ground.evaluation.faults`), but some at 50 Hz. Or the filter is lost more often than the foot
+        (`proving_ground.evaluation.foot.faults`), but some at 50 Hz. Or the filter is lost more often than the foot
         stands, and ten times at least: a force a hundred times too large, or none.
         """
         names = ("stances", "contradictions", "realignments")

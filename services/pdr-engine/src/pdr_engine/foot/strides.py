@@ -147,6 +147,7 @@ def describe_stride(s: Record, row: Record) -> None:
     row.pitch_rad = angle_between(s.steep_cosine)
     row.peak_rate_rad_s = math.sqrt(s.peak_rate)
     row.cut_rad = math.sqrt(s.cut_angle)
+    row.cut_turn_rad = math.sqrt(s.cut_turn)
     row.peak_force_m_s2 = math.sqrt(s.peak_force)
 
 
@@ -163,5 +164,5 @@ def begin_stride(s: Record, at: int) -> None:
     s.swing = s.lifted = at + 1
     s.landed = at
     s.steep_cosine = 2.0
-    s.peak_rate = s.peak_force = s.worst_nis = s.cut_angle = 0.0
+    s.peak_rate = s.peak_force = s.worst_nis = s.cut_angle = s.cut_turn = 0.0
     assign(s.correction, (0.0, 0.0, 0.0))

@@ -4,7 +4,7 @@ The filter's own covariance knows noise, not how people move. Two things mend it
 the step's end show how wrong the swing was: under Student's t with ν degrees of freedom instead of Gaussian noise,
 the posterior covariance is (ν + NIS)/(ν + 3) times the filter's (Roth, Özkan and Gustafsson 2013). And motions
 differ: factors by class, such that of ten-second displacements 95 % lie inside their ellipse
-(`proving_ground.evaluation.honesty`).
+(`proving_ground.evaluation.foot.honesty`).
 
 Steps also err alike: the sole rolls in every stance, so all are short or long together and rise or fall together,
 the gyro's bias turns all the same way, and a gyro that saturates cuts the same peak off every stride. No covariance
@@ -28,7 +28,10 @@ COMMON_SLOPE = np.array(
     [0.0075, 0.0075, 0.0075, 0.0075, 0.015, 0.015]
 )  # 1 σ, of a step's length on the ground
 COMMON_TURN_RAD_S = 6.5e-4  # 1 σ: 2.2 °/min
-CUT_ALIKE = 0.2  # as a turn, of the angle that cut peaks may take along: every stride cuts the same peak
+# Every stride cuts the same peak, so a part of what that takes along is alike: of the turn about the vertical (of
+# single peaks' errors a fifth of the variance lasts), and, as a turn by the landing's corrections, of the tilt.
+CUT_ALIKE = 0.5
+CUT_LEANS = 0.05
 CUT_SHRINKS = 50.0  # of that angle's fourth power, as a scale error: nothing for runs, a quarter for sprints
 TAIL = 1.0  # ν
 MEASURED = 3.0  # components of the velocity
@@ -79,7 +82,8 @@ def widen(row: Record) -> None:
     across = math.hypot(row.displacement_m[0], row.displacement_m[1])
     row.covariance[2, 2] += (COMMON_SLOPE[row.motion] * across) ** 2
     duration_s = max(1, row.time_ns - row.start_time_ns) * NS
-    turn = math.hypot(COMMON_TURN_RAD_S * duration_s, CUT_ALIKE * cut)
+    cut_turn = math.hypot(CUT_ALIKE * plane * row.cut_turn_rad, CUT_LEANS * cut)
+    turn = math.hypot(COMMON_TURN_RAD_S * duration_s, cut_turn)
     row.covariance[3, 3] += turn**2
     row.common_scale, row.common_slope = scale, COMMON_SLOPE[row.motion]
     row.common_turn_rad_s = turn / duration_s

@@ -1,4 +1,4 @@
-"""Weights of the learned stance detector. Made by `python -m proving_ground.evaluation.train_stance`.
+"""Weights of the learned stance detector, by `python -m proving_ground.evaluation.foot.train_stance`.
 
 Trained on pyshoe-vicon (Wagstaff, Peretroukhin and Kelly, University of Toronto), gaitmap-example
 (MaD Lab, FAU) and dualfoot-fgo (Hu and Hu), all under the MIT licence.

@@ -53,7 +53,9 @@ class MemoryCounters:
         self._next = 0
 
     def reserve(self) -> Block:
-        """The next block of the one epoch."""
+        """The next block; of the next epoch when this one's counters are used up."""
+        if self._next + self._block > COUNTERS:
+            self._epoch, self._next = self._epoch + 1, 0
         first, self._next = self._next, self._next + self._block
         return Block(self._epoch, first, self._next)
 

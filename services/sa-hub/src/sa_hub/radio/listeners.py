@@ -13,16 +13,21 @@ from typing import Final
 import numpy as np
 
 from bootprint.clock import NS_PER_S
+from sa_hub.radio.arrears import after, certainly, needed
 from sa_hub.radio.content import Feedback
 from sa_hub.radio.feedback_codec import COUNTER_MODULUS
-from sa_hub.radio.picture import BoolArray, Pictures, Spoken
+from sa_hub.radio.ground import FloatArray
+from sa_hub.radio.picture import BoolArray, IntArray, Pictures, Spoken
 
 ROWS: Final = 24
 LOSSLESS: Final = 0.005
 """Below this loss one receiver stands for all."""
 _SILENT_NS: Final = 300 * NS_PER_S
 _REMEMBERED: Final = 64
-_LEARNING: Final = 0.02
+_ASSUMED_FRAMES: Final = (4, 20)
+"""As many frames as the loss that was assumed counts, the second if it was stated."""
+_LOSS_FRAMES: Final = 50
+"""The loss is that of about so many frames last told of."""
 _NONE_OPEN: Final = 1 << 40
 
 
@@ -30,12 +35,14 @@ _NONE_OPEN: Final = 1 << 40
 class _Listener:
     """One hub that gives feedback: the row of its certain picture, and the last frame that this takes in.
 
-    ``proven``: the time of the newest report by slot that it has said to have heard in a frame of ours.
+    ``arrears``: the odds of how far it is behind by now, by slot. ``proven``: the time of the newest report by slot
+    that it has said to have heard in a frame of ours.
     """
 
     row: int
     counter: int
     told_ns: int
+    arrears: FloatArray
     proven: dict[int, float] = field(default_factory=dict)
 
 
@@ -48,6 +55,7 @@ class Listeners:
 
     def __init__(self, loss: float, seed: int) -> None:
         self.loss = loss
+        self._judged = _ASSUMED_FRAMES[loss >= LOSSLESS]
         self._random = np.random.default_rng(seed)
         self._slots = 0
         self._sent: deque[tuple[int, Spoken]] = deque(maxlen=_REMEMBERED)
@@ -78,6 +86,16 @@ class Listeners:
         self._slots = slots
         for pictures in (self._certain, self._stand_ins, self.pictures):
             pictures.widen(slots)
+        for each in self._listeners.values():
+            more = slots - len(each.arrears)
+            each.arrears = np.concatenate([each.arrears, certainly(np.full(more, _NONE_OPEN))])
+
+    def needs(self, slots: IntArray, unsure: float) -> IntArray:
+        """(n,) what updates must allow for, so that listeners refuse hardly more than a share of ``unsure``."""
+        most = np.zeros(len(slots), dtype=np.int64)
+        for each in self._listeners.values():
+            most = np.maximum(most, needed(each.arrears[slots], unsure))
+        return most
 
     def certain(self) -> Iterator[tuple[int, int, float]]:
         """(listener, slot, report's time) of all that listeners have said to have heard of us."""
@@ -91,6 +109,7 @@ class Listeners:
             pictures.forget(slot)
         for each in self._listeners.values():
             each.proven.pop(slot, None)
+            each.arrears[slot] = certainly(np.array([_NONE_OPEN]))[0]
 
     def clear(self) -> None:
         """Nobody knows anything."""
@@ -105,6 +124,8 @@ class Listeners:
         """Our frame is on the air."""
         self._sent.append((counter, spoken))
         self._may_hear(spoken)
+        for each in self._listeners.values():
+            each.arrears = after(each.arrears, spoken, self.loss)
 
     def overheard(self, spoken: Spoken) -> None:
         """Somebody else's frame was on the air."""
@@ -140,6 +161,7 @@ class Listeners:
             if known.counter < counter <= newest:
                 self._settle(known, spoken, _was_heard(feedback, newest - counter))
         known.counter = max(known.counter, newest)
+        self._reckon(known)
         self._drop_silent(now_ns)
         self._deal()
 
@@ -149,6 +171,14 @@ class Listeners:
         self._drop_silent(now_ns)
         if (len(self._listeners), self.all_tell) != before:
             self._deal()
+
+    def _reckon(self, listener: _Listener) -> None:
+        """How far behind it may be: as it told, and by chance in what was sent since."""
+        behind = self._certain.behind(np.arange(self._slots))[listener.row]
+        listener.arrears = certainly(behind)
+        for counter, spoken in self._sent:
+            if counter > listener.counter:
+                listener.arrears = after(listener.arrears, spoken, self.loss)
 
     def _newest(self, feedback: Feedback) -> int:
         """The whole counter of which feedback tells the low bits."""
@@ -164,7 +194,12 @@ class Listeners:
             if heard and certain.known[row, slot] and certain.time_s[row, slot] == time_s:
                 listener.proven[slot] = time_s
         if heard is not None:
-            self.loss += _LEARNING * ((not heard) - self.loss)
+            self._learn(missed=not heard)
+
+    def _learn(self, *, missed: bool) -> None:
+        """The mean of so many frames and of what was assumed: right from the first ones on, and never certain."""
+        self._judged = min(self._judged + 1, _LOSS_FRAMES)
+        self.loss += (missed - self.loss) / self._judged
 
     def _new_listener(self, listener: int, now_ns: int) -> _Listener:
         """Begins with nothing: what it has is what it says to have heard."""
@@ -172,7 +207,8 @@ class Listeners:
         for row in range(self._certain.rows):
             certain.copy(row, self._certain, row)
         self._certain = certain
-        self._listeners[listener] = _Listener(certain.rows - 1, -1, now_ns)
+        never = np.full(self._slots, _NONE_OPEN)
+        self._listeners[listener] = _Listener(certain.rows - 1, -1, now_ns, certainly(never))
         return self._listeners[listener]
 
     def _drop_silent(self, now_ns: int) -> None:
@@ -190,8 +226,16 @@ class Listeners:
                 each.row = row
             self._certain = kept
 
+    def _spread(self) -> None:
+        """Frames are lost after all: stand-ins so far heard the same, from now on each by chance."""
+        alike, self._stand_ins = self._stand_ins, Pictures(ROWS, self._slots)
+        for row in range(ROWS):
+            self._stand_ins.copy(row, alike, 0)
+
     def _deal(self) -> None:
         """Give every listener its share of rows: its certain picture, and by chance what it has not told of yet."""
+        if self.loss >= LOSSLESS and self._stand_ins.rows < ROWS:
+            self._spread()
         shares = len(self._listeners) + (not self.all_tell)
         copies = max(1, ROWS // shares)
         told = copies * len(self._listeners)

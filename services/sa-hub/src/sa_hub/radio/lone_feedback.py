@@ -11,7 +11,7 @@ from bootprint.clock import NS_PER_S
 
 SHARE: Final = 0.25
 """Of the link's rate: lone feedback takes no more."""
-LEAST_PAUSE_S: Final = 5.0
+LEAST_PAUSE_S: Final = 2.0
 PATIENCE_S: Final = (1.0, 10.0)
 """How long feedback waits for a report, while we have nothing to tell and while we do."""
 _LOOK_S: Final = 0.5

@@ -62,6 +62,8 @@ _ALLOWED: Final = {resolution: _allowed(resolution, reaches) for resolution, rea
 class Wares:
     """What there is to tell of n soldiers. ``worth`` (rows, n): of telling, by receiver; ``behind`` likewise.
 
+    ``needs`` (n,): what an update must allow for so that hardly anyone refuses it.
+
     ``bits`` (n,) beside the place, ``velocity_bits`` of them need not be told where ``steady`` (n, DEPTH) holds for
     all that may be missed; ``changes_bits`` (n, DEPTH) of what has changed, by how much may be missed;
     ``off_cells`` (n, DEPTH) see `History.cells_off`; ``span_cells``: how far the soldiers lie apart; ``span``: how
@@ -70,6 +72,7 @@ class Wares:
 
     worth: FloatArray
     behind: IntArray
+    needs: IntArray
     bits: FloatArray
     velocity_bits: FloatArray
     steady: BoolArray
@@ -141,14 +144,16 @@ def best_offer(wares: Wares, terms: Terms) -> Offer | None:
 
 def _allowances(wares: Wares, terms: Terms) -> list[int]:
     """What an update may allow to be missed: up to the first that leaves out nobody who can be reached at all."""
-    most = int(np.max(np.where(wares.behind <= MISSES[-1], wares.behind, 0), initial=terms.least_misses))
+    reachable = np.where(wares.behind <= MISSES[-1], wares.behind, 0)
+    most = int(max(terms.least_misses, reachable.max(initial=0), wares.needs.max(initial=0)))
     enough = next(misses for misses in MISSES if misses >= most)
     return [misses for misses in MISSES if terms.least_misses <= misses <= enough]
 
 
 def _update(wares: Wares, terms: Terms, misses: int, *, varied: bool) -> Offer:
     """The best modulus for an update that allows so much to be missed."""
-    gain = terms.delivered * np.where(wares.behind <= misses, wares.worth, 0.0).mean(axis=0)
+    resolved = (wares.behind <= misses) & (wares.needs <= misses)
+    gain = terms.delivered * np.where(resolved, wares.worth, 0.0).mean(axis=0)
     reaches, allowed = _REACHES[wares.resolution], _ALLOWED[wares.resolution]
     off_cells, changes_bits = wares.off_cells[:, misses], wares.changes_bits[:, misses]
     gap_bits, span_bits = _number_bits(wares.span, int(np.count_nonzero(gain > 0.0)))

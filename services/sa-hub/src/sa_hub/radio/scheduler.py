@@ -48,6 +48,8 @@ _CHEAP_MISSES: Final = 3
 _URGED_WORTH: Final = 50.0
 SURE_MISSES: Final = 2
 """What updates allow for in any case where frames are lost: feedback is never of the last one."""
+UNSURE: Final = (0.003, 0.001)
+"""Who says what it hears refuses an update with no more than this probability, the second where bits are cheap."""
 LOSSY_SHARE: Final = 0.15
 """Of the price of an entry's bits where frames are lost: who is told in every frame is never long wrong, and his
 place, told against what is fresh, takes few bits. Counting only what is wrong now would leave him out."""
@@ -331,6 +333,7 @@ class Scheduler:
         return Wares(
             worth=value,
             behind=self.listeners.pictures.behind(who.slots),
+            needs=self.listeners.needs(who.slots, UNSURE[self.is_cheap]),
             bits=velocity_bits + _AGE_BITS * old,
             velocity_bits=velocity_bits,
             steady=self._history.steady(who.slots, telling.velocity),

@@ -1,25 +1,24 @@
 """Height from a barometer that knows how one walks (METHODS A8).
 
-Pressure is treated by how height is won (`climb`): on the level it is weather and moves a drift
-state; on slopes and in lifts height follows it; on stairs every step adds a riser, whose height is a state too,
-learned within its norm. A Kalman filter of height, drift and riser runs `LAG_S` behind, when it is clear what the
-way was; `height_m` is for now. Satellite or known heights correct height against drift.
+Pressure is treated by how height is won (`climb`): on the level it is weather and moves a drift state; on slopes
+and in lifts height follows it; on stairs every step adds a riser, whose height is a state too, learned within its
+norm, and a climb made again is as high as before (`height_filter`). That filter runs `LAG_S` behind, when it is
+clear what the way was; `height_m` is for now. Satellite or known heights correct height against drift.
 """
 
 import math
 from bisect import bisect
 from collections import deque
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from pdr_engine.body.altitude.climb import RISER_M, TICK_S, Belief, Tick, Way, advance, smoothed
+from pdr_engine.body.altitude.climb import TICK_S, Belief, Tick, Way, advance, smoothed
+from pdr_engine.body.altitude.height_filter import HeightFilter
 from pdr_engine.body.altitude.vertical import VerticalChannel
 from pdr_engine.body.movement.classes import Climb
 from pdr_engine.body.pieces import FloatArray
-
-if TYPE_CHECKING:
-    from filterpy.kalman import KalmanFilter
+from pdr_engine.body.settings import AltitudeSettings
 
 _LAG_TICKS = 5
 LAG_S = _LAG_TICKS * TICK_S
@@ -31,13 +30,7 @@ _SLOPE_WINDOW_S, _LEAST_IN_WINDOW = 2.0, 3
 _NOISE_M, _LEAST_SIGMA_M, _NOISE_SHARE, _SURELY_LEVEL, _MOST_MISS = 0.08, 0.01, 0.03, 0.9, 2.5
 SEA_LEVEL_PA, _SCALE_M, _EXPONENT = 101_325.0, 44_330.77, 0.190263  # ISO 2533, up to 11 km
 
-_DRIFT_M_PER_SQRT_S = 0.05  # 35 Pa in √h: an unsettled day
-_FOLLOW_M_PER_SQRT_S: dict[Way, float] = {"level": 0.012, "slope": 0.5, "stairs": 0.02, "lift": 1.5}
-_RISER_SIGMA_M = 0.012
-_STEP_SIGMA_M = 0.02
-_LEAST_NOISE_M = 0.05
-_UNKNOWN_M = 500.0
-_HEIGHT, _DRIFT, _RISER = range(3)
+_LEAST_NOISE_M = 0.12  # draughts and a unit's own wander last longer than a tick
 
 
 def pressure_height_m(pressure_pa: float) -> float:
@@ -59,8 +52,9 @@ class Altimeter:
     Call `step` for each step as it ends and `pressure` for each sample; times in ns, each in order.
     """
 
-    def __init__(self) -> None:
-        self._filter = _fresh_filter()
+    def __init__(self, settings: AltitudeSettings | None = None) -> None:
+        self._settings = settings or AltitudeSettings()
+        self._filter = self._begun_at(0.0)
         self._samples: deque[_Sample] = deque()
         self._steps: deque[float] = deque()
         self._zero_ns: int | None = None
@@ -88,7 +82,7 @@ class Altimeter:
         height = pressure_height_m(pressure_pa)
         if self._zero_ns is None:
             self._zero_ns = time_ns
-            self._filter.x = np.array([0.0, height, RISER_M])
+            self._filter = self._begun_at(height)
         time_s = (time_ns - self._zero_ns) / _NS_PER_S
         if self._samples and time_s <= self._samples[-1].time_s:
             return
@@ -104,19 +98,14 @@ class Altimeter:
         if self._zero_ns is None:
             return
         # The height of now is that of the tick and what was climbed since.
-        since_m = self.height_m - float(self._filter.x[_HEIGHT])
-        if self.reference_ns is None:
-            self._filter.P[_HEIGHT, _HEIGHT] += _UNKNOWN_M**2
-            self._filter.P[_DRIFT, _DRIFT] += _UNKNOWN_M**2
-            self._filter.P[_HEIGHT, _DRIFT] -= _UNKNOWN_M**2
-            self._filter.P[_DRIFT, _HEIGHT] -= _UNKNOWN_M**2
-        self._filter.update(np.array([height_m - since_m]), R=sigma_m**2, H=np.array([[1.0, 0.0, 0.0]]))
+        since_m = self.height_m - self._filter.height_m
+        self._filter.reference(height_m - since_m, sigma_m)
         self.reference_ns = time_ns
 
     @property
     def height_m(self) -> float:
         """Height now: that of `LAG_S` ago, and what pressure says was climbed since unless that was level."""
-        lagged = float(self._filter.x[_HEIGHT])
+        lagged = self._filter.height_m
         if not self._samples or self._now is None or self._now.way == "level":
             return lagged
         settled_s = self._settled_s
@@ -129,17 +118,17 @@ class Altimeter:
     @property
     def settled_height_m(self) -> float:
         """Height `LAG_S` ago, by all that was known since."""
-        return float(self._filter.x[_HEIGHT])
+        return self._filter.height_m
 
     @property
     def sigma_m(self) -> float:
         """Of the height, against the last reference."""
-        return math.sqrt(float(self._filter.P[_HEIGHT, _HEIGHT]))
+        return self._filter.sigma_m
 
     @property
     def riser_m(self) -> float:
         """The stairs' riser as learned."""
-        return float(self._filter.x[_RISER])
+        return self._filter.riser_m
 
     @property
     def way(self) -> Way:
@@ -192,6 +181,9 @@ class Altimeter:
         """The middle of the newest settled tick."""
         return (self._next_tick - _LAG_TICKS - 0.5) * TICK_S
 
+    def _begun_at(self, pressure_m: float) -> HeightFilter:
+        return HeightFilter(pressure_m, self._settings.storey_m, self._settings.storey_sigma_m)
+
     def _tick(self) -> None:
         """A tick is over: the belief about now, and the height of the tick that is settled by it."""
         oldest = self._means[0] if len(self._means) == _LAG_TICKS else None
@@ -239,31 +231,21 @@ class Altimeter:
 
     def _settle(self, mean: _Sample | None) -> None:
         """The height filter a tick on."""
-        at_s = self._settled_s
-        half = 0.5 * TICK_S
-        self._predict(sum(at_s - half <= step_s < at_s + half for step_s in self._steps))
-        if mean is not None:
-            noise = max(self._noise_m, _LEAST_NOISE_M)
-            self._filter.update(np.array([mean.pressure_m]), R=noise**2, H=np.array([[1.0, 1.0, 0.0]]))
-            self._keep_to_norm()
-
-    def _predict(self, steps: int) -> None:
-        """Half a second on, with these steps."""
+        at_s, half = self._settled_s, 0.5 * TICK_S
+        steps = sum(at_s - half <= step_s < at_s + half for step_s in self._steps)
         way = self.settled_way
-        follow, risers = _FOLLOW_M_PER_SQRT_S[way], 0.0
-        transition = np.eye(3)
-        if way == "stairs":
-            risers = float(steps) if self._settled is not None and self._settled.up else -float(steps)
-            transition[_HEIGHT, _RISER] = risers
-        noise = np.diag(
-            [follow**2 * TICK_S + abs(risers) * _STEP_SIGMA_M**2, _DRIFT_M_PER_SQRT_S**2 * TICK_S, 1e-8]
-        )
-        self._filter.predict(F=transition, Q=noise)
+        risers = variance = 0.0
+        if self._settled is not None and self._may_be_stairs(self._settled):
+            risers, variance = (steps * one for one in self._settled.risers_a_step)
+        self._filter.predict(way, risers, variance)
+        if mean is not None:
+            self._filter.pressure(mean.pressure_m, max(self._noise_m, _LEAST_NOISE_M))
+        self._filter.follow_climb(way)
 
-    def _keep_to_norm(self) -> None:
-        """A riser is built within its norm, whatever pressure does."""
-        spread = 3.0 * _RISER_SIGMA_M
-        self._filter.x[_RISER] = np.clip(self._filter.x[_RISER], RISER_M - spread, RISER_M + spread)
+    def _may_be_stairs(self, belief: Belief) -> bool:
+        """Who hardly walks on the level has climbed some of the risers already."""
+        way = belief.way
+        return way == "stairs" or (way == "level" and belief.probability["level"] < _SURELY_LEVEL)
 
     def _cadence_hz(self, at_s: float) -> float:
         """Of the step that was under way, or had just ended, with the one before; 0 where nobody walked."""
@@ -284,7 +266,7 @@ class Altimeter:
     def _bridge(self, time_s: float) -> None:
         """Over a gap anything may have been climbed: height follows the pressure, and is unsure."""
         gap_s = time_s - self._samples[-1].time_s
-        self._filter.P[_HEIGHT, _HEIGHT] += (0.5 * gap_s) ** 2
+        self._filter.lose(0.5 * gap_s)
         self._samples.clear()
         self._means.clear()
         self._before = self._settled = self._now = None
@@ -304,12 +286,3 @@ def _rate(samples: FloatArray) -> float:
     time_s, height = samples.T
     centred = time_s - time_s.mean()
     return float(centred @ height / (centred @ centred))
-
-
-def _fresh_filter() -> "KalmanFilter":
-    from filterpy.kalman import KalmanFilter  # tens of megabytes: loaded only where there is a barometer
-
-    kalman = KalmanFilter(dim_x=3, dim_z=1)
-    kalman.x = np.zeros(3)
-    kalman.P = np.diag([0.01, 0.09, _RISER_SIGMA_M**2])
-    return kalman

@@ -79,6 +79,14 @@ _RISE_M, _SIGMA_M, _NOISE_M = (
 _WALKS = np.array([model.walks for model in _MODELS])
 _IS_LIFT = np.array([model.way == "lift" for model in _MODELS])
 _SIGN = np.sign(_RISE_M)
+_BY_RISERS = np.array([model.way in ("level", "stairs") for model in _MODELS])
+_IS_EDGE = np.array([model.way == "stairs" and abs(model.rise_m) < RISER_M for model in _MODELS])
+_ON_STAIRS = np.array([float(model.way == "stairs") for model in _MODELS])
+# Half of an edge's ticks lie on a landing, the others begin or end a flight anywhere within.
+_RISERS, _RISERS_SQUARED = (
+    np.where(_IS_EDGE, 1.0 / 4.0, _ON_STAIRS),
+    np.where(_IS_EDGE, 1.0 / 6.0, _ON_STAIRS),
+)
 _WAYS: tuple[Way, ...] = ("level", "slope", "stairs", "lift")
 _OF_WAY = np.array([[float(model.way == way) for model in _MODELS] for way in _WAYS])
 
@@ -119,6 +127,14 @@ class Belief:
     def up(self) -> bool:
         """Whether it goes up rather than down."""
         return float(self.shares @ _SIGN) > 0.0
+
+    @property
+    def risers_a_step(self) -> tuple[float, float]:
+        """Mean, down negative, and variance, on stairs or the level: ends of flights and landings have fewer."""
+        shares = self.shares * _BY_RISERS
+        shares = shares / max(float(shares.sum()), _ANYTHING)
+        mean = float(shares @ (_RISERS * _SIGN))
+        return mean, float(shares @ _RISERS_SQUARED) - mean**2
 
     @property
     def climb(self) -> Climb:

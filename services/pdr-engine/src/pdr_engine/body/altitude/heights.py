@@ -35,6 +35,7 @@ class Heights:
     """Pressure and steps in, heights out; nothing is known, and no filter made, before the first pressure."""
 
     def __init__(self, settings: AltitudeSettings) -> None:
+        self._settings = settings
         self._altimeter: Altimeter | None = None
         self._floors = FloorCounter(settings.start_floor, settings.storey_m, settings.storey_sigma_m)
         self._channel = VerticalChannel()
@@ -48,7 +49,7 @@ class Heights:
     def pressure(self, time_ns: int, pressure_pa: float) -> None:
         """Take a sample in."""
         if self._altimeter is None:
-            self._altimeter = Altimeter()
+            self._altimeter = Altimeter(self._settings)
         altimeter = self._altimeter
         altimeter.pressure(time_ns, pressure_pa, self._channel)
         self._newest_ns = max(self._newest_ns, time_ns)

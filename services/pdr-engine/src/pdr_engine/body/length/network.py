@@ -2,7 +2,7 @@
 
 One hidden layer of tanh units on logarithms; the output is the logarithm of the length against a usual step. Inputs
 are held within what the network was trained on, so that it can never run away; the output is bounded besides.
-Weights: `network_weights`, made by ``python -m proving_ground.evaluation.train_body DATA``.
+Weights: `network_weights`, made by ``python -m proving_ground.evaluation.body.train DATA``.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Weights of `pdr_engine.body.length.network`, made by `proving_ground.evaluation.train_body` of recorded walks
+"""Weights of `pdr_engine.body.length.network`, made by `proving_ground.evaluation.body.train` of recorded walks
 (msindoor20) and simulated slopes.
 """
 

@@ -34,22 +34,26 @@ class Placement:
 
     def __init__(self, settings: LengthSettings) -> None:
         self._settings = settings
-        self._evidence, self._steps = _FIRST_EVIDENCE, _FIRST_STEPS
+        self._evidence = self._strikes = _FIRST_EVIDENCE
+        self._steps = _FIRST_STEPS
 
     def learn(self, gait: Gait) -> None:
         """Take another step in."""
         surge = (gait.surge_share - _SURGE) / _SURGE_SPREAD
         strikes = (gait.sharpness - _SHARPNESS) / _SHARPNESS_SPREAD
-        told = min(1.0, max(-1.0, 0.5 * (surge + strikes)))
         self._steps = min(self._steps + 1.0, _MEMORY_STEPS)
-        self._evidence += (told - self._evidence) / self._steps
+        self._evidence += (_bounded(0.5 * (surge + strikes)) - self._evidence) / self._steps
+        self._strikes += (_bounded(strikes) - self._strikes) / self._steps
 
     @property
     def on_trunk(self) -> bool:
-        """Whether the unit is known to be fixed to the trunk: told so, or by many steps that leave no doubt."""
+        """Whether the unit is known to be fixed to the trunk: told so, or by many steps that leave no doubt.
+
+        By strikes alone: at the small of the back a brisk walker's surge is no more than a hand's.
+        """
         if self._settings.placement != "auto":
             return self._settings.placement == "trunk"
-        return self._steps >= _SURE_STEPS and self._evidence > _SURE_EVIDENCE
+        return self._steps >= _SURE_STEPS and self._strikes > _SURE_EVIDENCE
 
     @property
     def pendulum_factor(self) -> float:
@@ -58,6 +62,11 @@ class Placement:
         told = min(1.0, max(0.0, 0.5 + self._evidence))
         share = {"hand": 0.0, "trunk": 1.0, "auto": told}[self._settings.placement]
         return hand + share * (trunk - hand)
+
+
+def _bounded(evidence: float) -> float:
+    """One step's, which may be a stumble."""
+    return min(1.0, max(-1.0, evidence))
 
 
 def pendulum(gait: Gait, settings: LengthSettings, factor: float, runs: bool) -> float:

@@ -26,9 +26,10 @@ _LEAST_ACCURACY_M = 0.5
 
 @dataclass(frozen=True, slots=True)
 class PnsGpsSettings:
-    """One sigma each. At the start: ``azimuth_rad``, ``deviation_rad``, ``length_share`` of the step length. As one
-    goes: white noise of a step's place ``step_m``, of the azimuth rad/√s, of the length's share /√s, and of a
-    velocity that fades in ``velocity_s``.
+    """One sigma each. At the start: ``azimuth_rad``, ``deviation_rad`` (of a compass that was calibrated as worn:
+    half a microtesla that was left, and a per cent of the vertical field, against some 20 µT across the ground),
+    ``length_share`` of the step length. As one goes: white noise of a step's place ``step_m``, of the azimuth
+    rad/√s, of the length's share /√s, and of a velocity that fades in ``velocity_s``.
 
     A fix errs by ``wander_share`` of its stated accuracy with a memory of ``wander_s``, and by ``white_share`` of
     it anew each time. It counts as reliable from ``least_satellites`` on, up to ``most_accuracy_m``, and within
@@ -36,7 +37,7 @@ class PnsGpsSettings:
     """
 
     azimuth_rad: float = math.radians(10.0)
-    deviation_rad: float = math.radians(1.0)
+    deviation_rad: float = math.radians(1.75)
     length_share: float = 0.1
     velocity_m_s: float = 0.05
     velocity_s: float = 30.0

@@ -1,0 +1,1 @@
+"""The foot INS scored: recorded runs, faults, what each choice is worth; its training and its page."""

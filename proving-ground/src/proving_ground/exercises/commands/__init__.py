@@ -1,0 +1,1 @@
+"""`bootprint exercise …`: what there is to play, playing, comparing, repeating."""

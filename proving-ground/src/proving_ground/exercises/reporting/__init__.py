@@ -1,0 +1,1 @@
+"""What people see of an exercise: the live table, score tables, plots, the report."""
