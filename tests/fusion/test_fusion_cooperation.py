@@ -19,6 +19,7 @@ from fusion.peers import Peers, Sight
 from fusion.state import Array, Layout
 from support.foot_walks import EAST, LEFT, NS, ORIGIN, RIGHT, T0, WHO, SimulatedWalk, envelope, in_time_order
 from support.foot_walks import straight as straight_on
+from support.peer_tracks import track
 
 FRAME = LocalFrame(ORIGIN)
 HERE = np.array([3.0, -4.0, 0.0])
@@ -29,22 +30,6 @@ CONFIG = PeersConfig()
 def sight(peer: str, place: tuple[float, float], excess_m: float = 0.0, sigma_m: float = 1.0) -> Sight:
     at = np.array([*place, 0.0])
     return Sight(peer, at, sigma_m, float(np.linalg.norm(HERE - at)) + excess_m, 0.3)
-
-
-def track(peer: str, place: tuple[float, float], at_ns: int = T0, **other: object) -> Track:
-    latitude, longitude, height = FRAME.to_geodetic(*place, 0.0)
-    made = Track(
-        time_ns=at_ns,
-        soldier=peer,
-        number=int(peer[1:]),
-        state="fresh",
-        latitude_deg=latitude,
-        longitude_deg=longitude,
-        height_m=height,
-        accuracy_m=0.5,
-        via="squad",
-    )
-    return msgspec.structs.replace(made, **other)
 
 
 # --- what fits together ----------------------------------------------------------------------------------------

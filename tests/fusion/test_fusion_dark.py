@@ -9,8 +9,7 @@ from msgspec.structs import replace
 from scipy.linalg import expm
 
 from bootprint.bus import Envelope
-from bootprint.geodesy import LocalFrame
-from bootprint.messages import FootPose, FootStep, Range, Track
+from bootprint.messages import FootPose, FootStep, Range
 from fusion.boots import Boots
 from fusion.config import FusionConfig
 from fusion.cooperation import Cooperation
@@ -35,6 +34,7 @@ from support.foot_walks import (
     in_time_order,
     rectangle,
 )
+from support.peer_tracks import track
 
 BY_BOOTS = FusionConfig(gnss_sources=(), start=EAST)
 
@@ -179,11 +179,11 @@ def test_ranges_along_the_arc_move_the_body_and_leave_its_heading_to_others(far_
     Nor does it after two steps, when the tangent would do for the place.
     """
     lost_m = np.array([far_m, 0.0, 0.0])
-    boots, counters, frame = lost_at(lost_m, 1.2), Counter[str](), LocalFrame(ORIGIN)
+    boots, counters = lost_at(lost_m, 1.2), Counter[str]()
     cooperation = Cooperation(BY_BOOTS.peers, ORIGIN, counters)
     truth = far_m * np.array([math.cos(1.0), math.sin(1.0)])
     for number, place in enumerate([(0.0, 60.0), (70.0, 30.0), (-20.0, -40.0), (60.0, -50.0)], start=2):
-        cooperation.track(told_of(f"a{number}", frame.to_geodetic(*place, 0.0)))
+        cooperation.track(track(f"a{number}", place))
         told = Range(time_ns=T0, sequence=number, peer=f"a{number}", distance_m=math.dist(truth, place))
         cooperation._peers.range(told, lost_m)
     cooperation.correct(boots, T0)
@@ -192,21 +192,6 @@ def test_ranges_along_the_arc_move_the_body_and_leave_its_heading_to_others(far_
     assert math.dist(boots.filter.state[block.position][:2], truth) < 2.0
     assert boots.filter.state[block.yaw] == 0.0
     assert boots.filter.covariance[block.yaw, block.yaw] == pytest.approx(1.44)
-
-
-def told_of(peer: str, place: tuple[float, float, float]) -> Track:
-    latitude_deg, longitude_deg, height_m = place
-    return Track(
-        time_ns=T0,
-        soldier=peer,
-        number=int(peer[1:]),
-        state="fresh",
-        latitude_deg=latitude_deg,
-        longitude_deg=longitude_deg,
-        height_m=height_m,
-        accuracy_m=0.5,
-        via="squad",
-    )
 
 
 @pytest.mark.parametrize("turn_rad", [0.0, 1e-9, 0.3, -2.0, math.pi])

@@ -15,9 +15,7 @@ from proving_ground.people import Itinerary, Leg, Person, move
 def test_a_building_s_heights_and_floors_through_the_whole_chain() -> None:
     score = run_building("office", "industrial", "belt", seed=1)
     assert len(score.stairs_error_m) == 4  # two storeys, both at once, and down again
-    *within, beyond = sorted(score.stairs_error_m)
-    assert max(within) < 0.4
-    assert beyond < 0.9  # at the end of the third the weather falls by 12 Pa, a metre, in 20 s
+    assert max(score.stairs_error_m) < 0.6
     assert len(score.lift_error_m) == 1
     assert score.lift_error_m[0] < 0.5
     assert told_pct([score.told], "slope", stairs=False) > 95.0
@@ -35,7 +33,7 @@ def test_stairs_are_measured_as_well_as_the_weather_lets_one() -> None:
     still, front = (replace(hall, drift_pa_per_sqrt_h=drift, told=False) for drift in (0.0, 300.0))
     assert max(stairs_errors_m(told, still, 1, steps=False)) < 0.05
     first_m, *again_m = stairs_errors_m(told, still, 1, steps=True)
-    assert max(again_m) < 0.1 < first_m < 0.3  # risers lower than most are learned
+    assert max(again_m) < 0.15 < first_m < 0.3  # risers lower than most are learned
     assert max(stairs_errors_m(told, front, 1, steps=False)) > 0.8
 
 

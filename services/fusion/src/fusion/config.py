@@ -232,8 +232,7 @@ class FusionConfig(Config, frozen=True):
     reorder_window_s: NonNegative = 0.3  # the longest wait for what is out of order
     stance_delay_s: NonNegative = 0.0  # a FootStep is stamped so long before poses already sent: never
     rate_hz: Annotated[float, msgspec.Meta(ge=1.0, le=20.0)] = 5.0
-    # Poses are stamped by the first sample after a time of the grid, which is the positions' too.
-    lookahead_s: NonNegative = 0.05
+    lookahead_s: NonNegative = 0.1  # a published position lies between two foot poses, this far apart
     floor_height_m: Positive | None = None
     unplaced_sigma_m: Positive = 10_000.0  # an unplaced soldier is published at the origin, give or take this
     start: StartConfig | None = None

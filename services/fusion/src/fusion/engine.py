@@ -9,10 +9,9 @@ What comes too late to be put in order follows one rule a kind, and is counted:
 
 A **Track** is of another's time and says how old it is: it is taken as it comes, past the order of the own inputs.
 
-A position at t is published when everything up to t + ``lookahead_s`` has been taken in, so that it knows the foot
-poses of that time instead of being up to a tenth of a second behind. So it depends on the messages alone, not on
-when ticks come. A ``patient`` core (replay as fast as possible) waits for everybody, whatever ticks say, to its
-close.
+A position at t is published when everything up to t + ``lookahead_s`` has been taken in, so that it lies between
+two foot poses instead of up to a tenth of a second behind. So it depends on the messages alone, not on when ticks
+come. A ``patient`` core (replay as fast as possible) waits for everybody, whatever ticks say, to its close.
 """
 
 from collections import Counter

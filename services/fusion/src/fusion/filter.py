@@ -276,17 +276,17 @@ class StateFilter:
     def join(self, block: FootBlock, beside: FootBlock, pose: Array, noise: Array, alike: bool) -> None:
         """Set a foot to ``pose`` (4,), found relative to the foot ``beside`` it, give or take ``noise`` (4, 4).
 
-        State augmentation: the new foot shares every error of the foot it was compared with, and turns with it.
-        Where both set off ``alike``, the difference between them is as much the fault of the one as of the other:
-        each gets half of it, with opposite shares, and it is their mean that keeps the covariance of the foot that
-        was here first.
+        State augmentation: the new foot shares every error of the foot it was compared with, and turns with it if
+        that was under way. Where both set off ``alike``, what the heading errs by since is each one's own, and the
+        difference between them as much the fault of the one as of the other: each gets half of it, with opposite
+        shares, and it is their mean that keeps the covariance of the foot that was here first.
         """
         transition, process = np.eye(self.layout.size), np.zeros_like(self.covariance)
         transition[block.all] = transition[beside.all]
-        away = pose[:3] - self.state[beside.position]
-        transition[block.position, beside.yaw] += _quarter_turn(away)
         process[block.all, block.all] = noise
-        if alike:
+        if not alike:
+            transition[block.position, beside.yaw] += _quarter_turn(pose[:3] - self.state[beside.position])
+        else:
             for one, other in ((block, block), (beside, beside), (block, beside), (beside, block)):
                 process[one.all, other.all] = (0.25 if one is other else -0.25) * noise
         state = self.state.copy()

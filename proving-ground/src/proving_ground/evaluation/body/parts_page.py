@@ -70,7 +70,7 @@ _BOUND_NOTE = f"""
 No combination of steps and pressure is within 0.4 m in every climb of such weather: that is 4.8 Pa, and a drift of
 50 Pa in √h makes as much in the half minute of 7.8 m. The table is of the same filter told by the truth what was
 climbed when, riser by riser, with a barometer of no noise of its own, in {len(WEATHERS)} weathers (odd seeds);
-then without risers. What helps is a climb that was made before, or a storey's height that is told.
+then without risers. What helps is a storey's height that is told.
 
 """
 _TOWN_NOTE = """Steps of the whole chain: a calibrated unit at the trunk, a third of the blocks with a stretch of as

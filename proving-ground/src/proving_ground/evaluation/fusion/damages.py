@@ -256,7 +256,7 @@ DAMAGES: Sequence[Damage] = (
     of_the_right_unit("noise from 80 s", "left alone, within 2 m", alone_on(LEFT, 2.0), after(noisy)),
     of_the_right_unit("bias 0.3 rad/s from 80 s", "within 1.5 m", within(1.5), after(biased(0.3))),
     of_the_right_unit(
-        "clips at 150 °/s", "left alone, within 7 m", alone_on(LEFT, 7.0), clipped(gyro_deg_s=150.0)
+        "clips at 150 °/s", "left alone, within 6 m", alone_on(LEFT, 6.0), clipped(gyro_deg_s=150.0)
     ),
     of_the_right_unit("loses 20 % of samples", "within 1 m", within(1.0), missing(0.2)),
     dying("fusion dies", "goes on, within 0.8 m", within(0.8, "memory_gone_on_from"), fusion_dies_s=80.0),

@@ -5,17 +5,14 @@ meanwhile nobody measured. Every soldier of building-clearing, four times a seed
 are published from then on: errors, and whether the truth is inside the ellipses.
 """
 
-import argparse
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from bootprint import logs
 from bootprint.clock import NS_PER_S
-from pdr_engine.foot import warm_up
+from proving_ground.evaluation.fusion.by_seeds import print_table
 from proving_ground.evaluation.fusion.library_honesty import Honesty, honesty
 from proving_ground.evaluation.fusion.lines import Heard
 from proving_ground.exercises.event_time.inprocess_play import line_job
@@ -87,14 +84,5 @@ def table(found: Mapping[str, Sequence[Honesty]]) -> list[str]:
     return lines
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure the seeds asked for and print the table."""
-    parser = argparse.ArgumentParser(description="what seconds in the dark cost")
-    parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS))
-    logs.configure("error")
-    warm_up()
-    sys.stdout.write("\n".join(table(measure(parser.parse_args(arguments).seeds))) + "\n")
-
-
 if __name__ == "__main__":
-    main()
+    print_table("what seconds in the dark cost", SEEDS, lambda seeds: table(measure(seeds)))

@@ -4,20 +4,17 @@ Two minutes of satellites, then none for twenty, over mixed movement (``scenario
 last minute of the gap, of the distance walked in it: the 95th percentile over soldiers and seeds.
 """
 
-import argparse
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from bootprint import logs
 from bootprint.bus import Envelope
 from bootprint.clock import NS_PER_S
 from bootprint.messages import Position
-from pdr_engine.foot import warm_up
 from proving_ground.evaluation.alignment import interpolated
+from proving_ground.evaluation.fusion.by_seeds import print_table
 from proving_ground.evaluation.fusion.library_honesty import cases
 from proving_ground.evaluation.fusion.lines import Heard, Keep, everything, fused
 
@@ -97,14 +94,5 @@ def table(found: Mapping[str, Sequence[Gap]]) -> list[str]:
     return lines
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure the seeds asked for and print the table."""
-    parser = argparse.ArgumentParser(description="dead reckoning over twenty minutes")
-    parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS))
-    logs.configure("error")
-    warm_up()
-    sys.stdout.write("\n".join(table(measure(parser.parse_args(arguments).seeds))) + "\n")
-
-
 if __name__ == "__main__":
-    main()
+    print_table("dead reckoning over twenty minutes", SEEDS, lambda seeds: table(measure(seeds)))

@@ -131,7 +131,8 @@ receivers was chosen, the others were not.
   covariance follows each correction as an invariant filter's does (`fusion.filter`), walkers are compared in axes
   that turn with them (`fusion.models.turned`), and what a badly known heading does to a long way beyond the first
   order is in the published ellipse (`fusion.models.body`). A fix that such a heading's tangent cannot explain moves
-  the body and leaves the heading to courses, which turn the way walked along its arc.
+  the body and leaves the heading to courses, which turn the way walked along its arc. Not so when both feet set
+  off together: a start whose azimuth is known to worse than 15° becomes surer by that than it is.
 - **Facing** (`facing_rad`) is told by the boots that stand, which learn from steps ahead how their sensors sit,
   else by the body's last step.
 - **Ranges to others of the squad** (`fusion.cooperation`) correct who is less sure than they are. A peer's place

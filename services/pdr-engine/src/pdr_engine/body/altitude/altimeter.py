@@ -2,7 +2,7 @@
 
 Pressure is treated by how height is won (`climb`): on the level it is weather and moves a drift state; on slopes
 and in lifts height follows it; on stairs every step adds a riser, whose height is a state too, learned within its
-norm, and a climb made again is as high as before (`height_filter`). That filter runs `LAG_S` behind, when it is
+norm, and a storey is as high as it is told to be (`height_filter`). That filter runs `LAG_S` behind, when it is
 clear what the way was; `height_m` is for now. Satellite or known heights correct height against drift.
 """
 

@@ -1,9 +1,7 @@
-"""Kalman filter of height, weather's drift, the stairs' riser, and how high climbs were (METHODS A8).
+"""Kalman filter of height, weather's drift, the stairs' riser and a storey's height (METHODS A8).
 
-Who climbs again what was climbed before, up or down, by stairs or lift, climbs as much as then; so are the storeys
-of a house alike, as far as their height was told. The heights of climbs are states as well, as landmarks are in
-simultaneous localisation and mapping (Smith, Self and Cheeseman 1990): a climb that is known again takes back what
-the weather did meanwhile, and tells the riser.
+Storeys of a house are alike, as far as their height was told: who surely climbed one, up or down, by stairs or
+lift, climbed as much as it is high, which takes back what the weather did meanwhile, and tells the riser.
 """
 
 import math
@@ -13,7 +11,7 @@ import numpy as np
 from pdr_engine.body.altitude.climb import RISER_M, TICK_S, Way
 from pdr_engine.body.pieces import FloatArray
 
-_HEIGHT, _DRIFT, _RISER, _FOOT, _FIRST_CLIMB = range(5)
+_HEIGHT, _DRIFT, _RISER, _FOOT, _STOREY = range(5)
 _FOLLOW_M_PER_SQRT_S: dict[Way, float] = {"level": 0.012, "slope": 0.5, "stairs": 0.02, "lift": 1.5}
 _BETWEEN_FLOORS: tuple[Way, ...] = ("stairs", "lift")  # slopes lead anywhere
 _STAYING_TICKS = 8  # on the level: shorter is a landing
@@ -25,24 +23,23 @@ _RISER_WANDER_M2 = 1e-8  # a prediction
 _SIGMAS_OF_NORM = 3.0
 _UNKNOWN_M = 500.0
 _LEAST_CLIMB_M = 1.5  # less is no flight of stairs
-_SAME_SIGMA_M = 0.1  # of one climb from time to time, and of storeys alike
-_ANOTHER_PER_M = 0.03  # density of climbs not seen yet
+_SAME_SIGMA_M = 0.1  # of storeys alike
+_ANOTHER_PER_M = 0.03  # density of climbs that are none
 _SURE = 0.8
-_MOST_CLIMBS = 8
 
 
 class HeightFilter:
     """``height_m`` above zero or what `reference` said, with its ``sigma_m``; ``riser_m`` as it is learned."""
 
     def __init__(self, pressure_m: float, storey_m: float, storey_sigma_m: float) -> None:
-        """``pressure_m`` is the height by pressure at zero; a storey is the first climb that is known."""
+        """``pressure_m`` is the height by pressure at zero; a storey is so high as far as is known."""
         self._mean: FloatArray = np.array([0.0, pressure_m, RISER_M, 0.0, storey_m])
         sigmas = np.array([_START_SIGMA_M, _START_DRIFT_M, _RISER_SIGMA_M, 0.0, storey_sigma_m])
         self._covariance: FloatArray = np.diag(sigmas**2)
         self._stay()
         self._referred = False
         self._level_ticks = 0
-        self._climbs = False  # by what leads between floors, and not known again yet
+        self._climbs = False  # by what leads between floors, and not known as a storey yet
 
     @property
     def height_m(self) -> float:
@@ -60,9 +57,9 @@ class HeightFilter:
         return float(self._mean[_RISER])
 
     @property
-    def climbs_m(self) -> FloatArray:
-        """How high (n,) the climbs were that are remembered."""
-        return self._mean[_FIRST_CLIMB:]
+    def storey_m(self) -> float:
+        """The height of a storey."""
+        return float(self._mean[_STOREY])
 
     def predict(self, way: Way, risers: float, risers_variance: float) -> None:
         """A tick on, over so many risers (down: negative)."""
@@ -95,20 +92,17 @@ class HeightFilter:
         self._covariance[_HEIGHT, _HEIGHT] += sigma_m**2
 
     def follow_climb(self, way: Way) -> None:
-        """By stairs or lift: begun where somebody stayed, known again or remembered where it ends."""
+        """By stairs or lift: begun where somebody stayed, and perhaps a storey where it ends."""
         if way != "level":
             self._climbs |= way in _BETWEEN_FLOORS
             self._level_ticks = 0
             return
         self._level_ticks += 1
-        if self._level_ticks == 1 and self._climbs and self._know_climb():
+        if self._level_ticks == 1 and self._climbs:
+            self._climbs = not self._know_storey()
+        if self._level_ticks >= _STAYING_TICKS:
             self._climbs = False
-        if self._level_ticks < _STAYING_TICKS:
-            return
-        if self._climbs:
-            self._remember_climb()
-            self._climbs = False
-        self._stay()
+            self._stay()
 
     def _stay(self) -> None:
         """No climb is under way: the next begins here."""
@@ -116,34 +110,18 @@ class HeightFilter:
         self._covariance[_FOOT] = self._covariance[_HEIGHT]
         self._covariance[:, _FOOT] = self._covariance[:, _HEIGHT]
 
-    def _know_climb(self) -> bool:
-        """Whether what was climbed is surely as high as some climb before; if so, it becomes so."""
-        climbed = self._climbed()
-        if climbed is None:
-            return False
-        rows = [climbed - self._row(index) for index in range(_FIRST_CLIMB, len(self._mean))]
-        weights = [self._likeness(row) for row in rows]
-        best = max(weights)
-        if best <= _SURE * (sum(weights) + _ANOTHER_PER_M):
-            return False
-        self._update(rows[weights.index(best)], 0.0, _SAME_SIGMA_M**2)
-        return True
-
-    def _remember_climb(self) -> None:
-        """What was climbed is another climb than those before."""
-        climbed = self._climbed()
-        if climbed is None:
-            return
-        grow = np.vstack([np.eye(len(climbed)), climbed])
-        if len(self.climbs_m) == _MOST_CLIMBS:
-            grow = np.delete(grow, _FIRST_CLIMB + 1, axis=0)  # never the storey, which was told
-        self._mean, self._covariance = grow @ self._mean, grow @ self._covariance @ grow.T
-
-    def _climbed(self) -> FloatArray | None:
-        """The row of how high somebody climbed since the last stay; None if that is nothing to speak of."""
+    def _know_storey(self) -> bool:
+        """Whether what was climbed since the last stay is surely a storey; if so, it becomes as high as one."""
         climbed = self._row(_HEIGHT) - self._row(_FOOT)
-        height_m = float(climbed @ self._mean)
-        return None if abs(height_m) < _LEAST_CLIMB_M else climbed * math.copysign(1.0, height_m)
+        climbed_m = float(climbed @ self._mean)
+        if abs(climbed_m) < _LEAST_CLIMB_M:
+            return False
+        apart = math.copysign(1.0, climbed_m) * climbed - self._row(_STOREY)
+        likeness = self._likeness(apart)
+        if likeness <= _SURE * (likeness + _ANOTHER_PER_M):
+            return False
+        self._update(apart, 0.0, _SAME_SIGMA_M**2)
+        return True
 
     def _likeness(self, row: FloatArray) -> float:
         """Density, per m, of what should be nothing at what it is."""
